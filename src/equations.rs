@@ -3,10 +3,13 @@
 mod dead_times;
 mod degree;
 mod moments;
+mod roots;
 mod slopes;
+mod stored;
 
 pub(crate) use dead_times::DeadTimes;
 pub(crate) use moments::MomentsOf;
+pub use roots::Roots;
 pub(crate) use slopes::{Jacobian, Slopes};
 
 use crate::functions::Functions;
@@ -18,6 +21,7 @@ use crate::signals::Signals;
 use core::fmt::{self, Display};
 use degree::{Degree, degrees};
 use serde::{Deserialize, Serialize};
+use stored::Parts;
 
 /// A model's quantities and its arithmetic, known at run time.
 ///
@@ -28,28 +32,7 @@ use serde::{Deserialize, Serialize};
 pub struct Equations {
     layout: Layout,
     graph: Graph,
-    state: Vec<Id>,
-    output: Vec<Id>,
-    /// Empty where not said.
-    diffusion: Vec<Id>,
-    noise: Vec<Id>,
-    delay: Vec<Id>,
-}
-
-/// The serialized form of equations.
-#[derive(Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Parts {
-    layout: Layout,
-    graph: Graph,
-    state: Vec<Id>,
-    output: Vec<Id>,
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    diffusion: Vec<Id>,
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    noise: Vec<Id>,
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    delay: Vec<Id>,
+    roots: Roots,
 }
 
 /// A graph that does not make up equations of its layout.
@@ -90,40 +73,24 @@ impl Equations {
     /// # Errors
     /// If they do not fit the layout.
     pub fn new(layout: Layout, graph: &Graph, state: &[Id], output: &[Id]) -> Result<Self, InvalidEquations> {
-        Equations::complete(layout, graph, [state, output, &[], &[], &[]])
+        let roots = Roots { state: state.to_vec(), output: output.to_vec(), ..Roots::default() };
+        Equations::complete(layout, graph, &roots)
     }
 
-    /// These equations with process noise, measurement noise and dead times, as [`Model::diffusion`], [`Model::noise`] and
-    /// [`Model::delay`] say them. Roots in this order: derivatives (next states), outputs, the diffusion of each state, the noise of each output,
-    /// the dead time of each input (s). The last three may be left empty.
+    /// The same with process noise, measurement noise, noise of the initial state and dead times.
     ///
     /// # Errors
-    /// If they do not fit the layout, or one of the last three depends on more than parameters.
-    pub fn complete(layout: Layout, graph: &Graph, roots: [&[Id]; 5]) -> Result<Self, InvalidEquations> {
-        let count = |role, expected: usize, found: usize| match expected == found {
-            true => Ok(()),
-            false => Err(InvalidEquations::Count { role, expected, found }),
-        };
+    /// If they do not fit the layout, or one of the four depends on more than parameters.
+    pub fn complete(layout: Layout, graph: &Graph, roots: &Roots) -> Result<Self, InvalidEquations> {
         layout.check()?;
-        let [state, output, diffusion, noise, delay] = roots;
-        count("states", if layout.kind == Kind::Static { 0 } else { layout.states.len() }, state.len())?;
-        count("outputs", layout.outputs.len(), output.len())?;
-        if !diffusion.is_empty() {
-            count("diffusions of states", layout.states.len(), diffusion.len())?;
-        }
-        if !noise.is_empty() {
-            count("noises of outputs", layout.outputs.len(), noise.len())?;
-        }
-        if !delay.is_empty() {
-            count("dead times of inputs", layout.inputs.len(), delay.len())?;
-        }
-        let all = roots.concat();
+        roots.check(&layout)?;
+        let all = roots.all();
         if let Some(root) = all.iter().find(|root| root.index() >= graph.len()) {
             return Err(InvalidEquations::NoSuchNode { node: root.index(), nodes: graph.len() });
         }
         let (graph, all) = graph.pruned(&all);
-        let (drift, levels) = all.split_at(state.len() + output.len());
-        let constant = graph.reached(levels);
+        let roots = roots.with(&all);
+        let constant = graph.reached(&roots.constant());
         for (node, constant) in graph.nodes().iter().zip(constant) {
             let Node::Leaf(leaf) = *node else { continue };
             let there = match leaf {
@@ -137,11 +104,7 @@ impl Equations {
                 return Err(InvalidEquations::NoSuchQuantity { leaf });
             }
         }
-        let (state, output) = drift.split_at(state.len());
-        let (diffusion, rest) = levels.split_at(diffusion.len());
-        let (noise, delay) = rest.split_at(noise.len());
-        let [state, output, diffusion, noise, delay] = [state, output, diffusion, noise, delay].map(<[Id]>::to_vec);
-        Ok(Equations { layout, graph, state, output, diffusion, noise, delay })
+        Ok(Equations { layout, graph, roots })
     }
 
     /// Reads a Rust model.
@@ -178,25 +141,32 @@ impl Equations {
             let p = leaves().3;
             let diffusion = M::State::into_array(model.diffusion(&p));
             let noise = M::Output::into_array(model.noise(&p));
+            let initial = M::State::into_array(model.initial_noise(&p));
             let delay = M::Input::into_array(model.delay(&p));
-            diffusion.as_ref().iter().chain(noise.as_ref()).chain(delay.as_ref()).copied().collect()
+            [diffusion.as_ref(), noise.as_ref(), initial.as_ref(), delay.as_ref()].concat()
         })?;
         Equations::traced(layout, &graph, [&state, &output, &levels])
     }
 
-    /// The equations of roots that were read: states, outputs, and the noise of both with the dead times.
+    /// The equations of roots that were read: states, outputs, and what depends on parameters alone.
     fn traced(layout: Layout, graph: &Graph, [state, output, levels]: [&[Id]; 3]) -> Result<Self, Untraceable> {
-        let (diffusion, rest) = levels.split_at(layout.states.len());
-        let (noise, delay) = rest.split_at(layout.outputs.len());
+        let mut levels = levels.iter().copied();
         // Noise that is not in the file is zero.
-        let said = |levels: &[Id], unsaid: fn(f64) -> bool| {
+        let mut said = |count: usize, unsaid: fn(f64) -> bool| -> Vec<Id> {
+            let levels: Vec<Id> = levels.by_ref().take(count).collect();
             let unsaid = |id: &Id| graph.known(*id).is_some_and(unsaid);
-            if levels.iter().all(unsaid) { vec![] } else { levels.to_vec() }
+            if levels.iter().all(unsaid) { vec![] } else { levels }
         };
         let zero = |level| level == 0.0;
-        let [diffusion, noise, delay] = [said(diffusion, zero), said(noise, f64::is_nan), said(delay, zero)];
-        Equations::complete(layout, graph, [state, output, &diffusion, &noise, &delay])
-            .map_err(|wrong| Untraceable { reason: wrong.to_string() })
+        let roots = Roots {
+            state: state.to_vec(),
+            output: output.to_vec(),
+            diffusion: said(layout.states.len(), zero),
+            noise: said(layout.outputs.len(), f64::is_nan),
+            initial_noise: said(layout.states.len(), zero),
+            delay: said(layout.inputs.len(), zero),
+        };
+        Equations::complete(layout, graph, &roots).map_err(|wrong| Untraceable { reason: wrong.to_string() })
     }
 
     /// The quantities.
@@ -209,36 +179,21 @@ impl Equations {
         &self.graph
     }
 
-    /// The derivative of each state (continuous) or its next value (discrete); empty for a static model.
-    pub fn state(&self) -> &[Id] {
-        &self.state
-    }
-
-    /// Each output.
-    pub fn output(&self) -> &[Id] {
-        &self.output
-    }
-
-    /// The process noise of each state and the measurement noise of each output; empty where not said.
-    pub fn levels(&self) -> [&[Id]; 2] {
-        [&self.diffusion, &self.noise]
-    }
-
-    /// The dead time of each input (s), in the order of the layout: roots that depend on parameters alone. Empty where not said.
-    pub fn delay(&self) -> &[Id] {
-        &self.delay
+    /// The nodes of the graph that make them up.
+    pub fn roots(&self) -> &Roots {
+        &self.roots
     }
 
     /// Whether derivatives and outputs are affine in the states: then so is each step, and slopes do not depend on states.
     pub fn is_affine(&self) -> bool {
         let degrees = degrees(&self.graph);
-        self.state.iter().chain(&self.output).all(|root| degrees[root.index()] <= Degree::One)
+        self.roots.moving().iter().all(|root| degrees[root.index()] <= Degree::One)
     }
 
     /// Moments of derivatives (next states), and of outputs, of a Gaussian state.
     pub(crate) fn moments(&self) -> (MomentsOf, MomentsOf) {
         let of = |roots: &[Id]| MomentsOf::of(&self.graph, roots, self.layout.states.len());
-        (of(&self.state), of(&self.output))
+        (of(&self.roots.state), of(&self.roots.output))
     }
 
     /// The values of roots; without time, states and inputs for what depends on parameters alone.
@@ -278,42 +233,32 @@ impl<S: Scalar> Functions<S> for Equations {
     fn state(&self, t: S, x: &[S], u: &[S], p: &[S], to: &mut [S]) {
         match self.layout.kind {
             Kind::Static => to.copy_from_slice(x),
-            _ => self.values(&self.state, Some((t, x, u)), p, to),
+            _ => self.values(&self.roots.state, Some((t, x, u)), p, to),
         }
     }
 
     fn output(&self, t: S, x: &[S], u: &[S], p: &[S], to: &mut [S]) {
-        self.values(&self.output, Some((t, x, u)), p, to);
+        self.values(&self.roots.output, Some((t, x, u)), p, to);
     }
 
     fn diffusion(&self, p: &[S], to: &mut [S]) {
         to.fill(S::from(0.0));
-        self.values(&self.diffusion, None, p, to);
+        self.values(&self.roots.diffusion, None, p, to);
     }
 
     fn noise(&self, p: &[S], to: &mut [S]) {
         to.fill(S::from(f64::NAN));
-        self.values(&self.noise, None, p, to);
+        self.values(&self.roots.noise, None, p, to);
+    }
+
+    fn initial_noise(&self, p: &[S], to: &mut [S]) {
+        to.fill(S::from(0.0));
+        self.values(&self.roots.initial_noise, None, p, to);
     }
 
     fn delay(&self, p: &[S], to: &mut [S]) {
         to.fill(S::from(0.0));
-        self.values(&self.delay, None, p, to);
-    }
-}
-
-impl From<Equations> for Parts {
-    fn from(Equations { layout, graph, state, output, diffusion, noise, delay }: Equations) -> Self {
-        Parts { layout, graph, state, output, diffusion, noise, delay }
-    }
-}
-
-impl TryFrom<Parts> for Equations {
-    type Error = InvalidEquations;
-
-    fn try_from(parts: Parts) -> Result<Self, InvalidEquations> {
-        let Parts { layout, graph, state, output, diffusion, noise, delay } = parts;
-        Equations::complete(layout, &graph, [&state, &output, &diffusion, &noise, &delay])
+        self.values(&self.roots.delay, None, p, to);
     }
 }
 
@@ -324,10 +269,11 @@ impl Display for Equations {
             Kind::Continuous => format!("d({name})/dt"),
             _ => format!("next {name}"),
         };
-        let state = self.layout.states.iter().zip(&self.state).map(|(quantity, root)| (left(&quantity.name), *root));
-        let outputs = self.layout.outputs.iter().zip(&self.output);
+        let state =
+            self.layout.states.iter().zip(&self.roots.state).map(|(quantity, root)| (left(&quantity.name), *root));
+        let outputs = self.layout.outputs.iter().zip(&self.roots.output);
         let output = outputs.map(|(quantity, root)| (format!("output {}", quantity.name), *root));
-        let late = self.layout.inputs.iter().zip(&self.delay).zip(self.late()).filter(|(_, late)| *late);
+        let late = self.layout.inputs.iter().zip(&self.roots.delay).zip(self.late()).filter(|(_, late)| *late);
         let delay = late.map(|((quantity, root), _)| (format!("dead time of {}", quantity.name), *root));
         let roots: Vec<(String, Id)> = state.chain(output).chain(delay).collect();
         self.graph.write(f, &|leaf| name(&self.layout, leaf), &roots)

@@ -265,6 +265,31 @@ pub enum Error {
         /// The predictor.
         predictor: String,
     },
+    /// A filter that starts from the stationary covariance of a plant that does not come to rest.
+    #[error(
+        "experiment `{experiment}`: the plant has no stationary covariance where the search starts, because state `{state}` does not come to rest \
+         (it grows by {} 1/{per}); start elsewhere, from InitialCovariance::FirstInterval (kalman:first-interval), or give the covariance by \
+         Model::initial_noise", short(*rate)
+    )]
+    NotStationary {
+        /// Name of the experiment.
+        experiment: String,
+        /// Name of the state.
+        state: String,
+        /// The real part of an eigenvalue of a continuous plant, about; of a discrete one, the logarithm of its magnitude.
+        rate: f64,
+        /// Unit of the time in which it grows.
+        per: &'static str,
+    },
+    /// States that were asked for by a predictor other than a Kalman filter.
+    #[error(
+        "states are filtered and smoothed by a Kalman filter, and this is {predictor}; take the predictor Kalman, with Model::diffusion and \
+         Model::noise"
+    )]
+    NotFiltered {
+        /// The predictor.
+        predictor: String,
+    },
     /// An initial state, or a restart, that the outputs do not give.
     #[error("experiment `{experiment}`: the state cannot be computed from the outputs ({reason}); {remedy}")]
     StateNotMeasured {

@@ -18,7 +18,7 @@ pub(crate) use examination::described;
 pub use examination::{Examination, Extent};
 pub(crate) use format::{Format, Version};
 pub use method::{CovarianceMethod, Method, NoiseModel};
-pub use prediction::Prediction;
+pub use prediction::{Prediction, StatesOf};
 pub use quantities::{Direction, ExperimentEstimate, Knowledge, OutputEstimate, OutputFit, ParameterEstimate, Unknown};
 pub(crate) use starts::times_the_cost;
 pub use starts::{FailedStart, Minimum, Starts};

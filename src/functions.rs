@@ -22,6 +22,9 @@ pub trait Functions<S>: Send + Sync {
     /// Measurement noise of each output, as [`Model::noise`].
     fn noise(&self, p: &[S], to: &mut [S]);
 
+    /// Standard deviation of each state at the first sample, as [`Model::initial_noise`].
+    fn initial_noise(&self, p: &[S], to: &mut [S]);
+
     /// Dead time of each input, as [`Model::delay`].
     fn delay(&self, p: &[S], to: &mut [S]);
 
@@ -159,6 +162,11 @@ impl<M: Model, S: Scalar> Functions<S> for Handle<'_, M> {
     fn noise(&self, p: &[S], to: &mut [S]) {
         let p = M::Parameters::from_fn(|i| p[i]);
         to.copy_from_slice(M::Output::into_array(Model::noise(&**self, &p)).as_ref());
+    }
+
+    fn initial_noise(&self, p: &[S], to: &mut [S]) {
+        let p = M::Parameters::from_fn(|i| p[i]);
+        to.copy_from_slice(M::State::into_array(Model::initial_noise(&**self, &p)).as_ref());
     }
 
     fn delay(&self, p: &[S], to: &mut [S]) {

@@ -84,7 +84,7 @@
 //! | write a model as a text file, or read one | [`text`] |
 //! | fit from a shell, without Rust | the command `greybox`: [`guide::chapter_17_command`] |
 //! | choose an integrator | [`Automatic`], [`Rk4`], [`Rk45`], [`Esdirk`], [`Discrete`] |
-//! | choose what is predicted | [`FreeRun`], [`Horizon`], [`Kalman`], [`SecondOrder`], [`predict`] |
+//! | choose what is predicted | [`FreeRun`], [`Horizon`], [`Kalman`], [`SecondOrder`], [`InitialCovariance`], [`predict`] |
 //! | weigh or filter errors, limit outliers | [`weighting`], [`loss`], [`Butterworth`] |
 //! | choose a search | [`optimize`]; argmin's solvers by [`Problem::objective`] |
 //! | read the result | [`Estimate`], [`Severity`], [`Knowledge`], [`Warning`], [`WarningCode`], [`Summary`], [`estimate`] |
@@ -201,6 +201,8 @@ pub mod sweep;
 #[cfg(feature = "text")]
 pub mod text;
 #[cfg(feature = "std")]
+mod transition;
+#[cfg(feature = "std")]
 pub mod weighting;
 #[cfg(feature = "std")]
 mod whiteness;
@@ -231,7 +233,7 @@ pub use {
     numeral::{Moment, TimeUnit},
     numeric::Numeric,
     outliers::hampel,
-    predict::{FreeRun, Horizon, Kalman, SecondOrder},
+    predict::{FreeRun, Horizon, InitialCovariance, Kalman, SecondOrder},
     prefilter::Butterworth,
     problem::{Problem, Search},
     record::{Initial, Time},

@@ -92,6 +92,14 @@ pub trait Model: Send + Sync {
         Self::Output::splat(S::from(f64::NAN))
     }
 
+    /// Standard deviation of each state at the first sample, about the initial state that is estimated or given, in the unit of the state.
+    /// Zero unless written. Predictors that filter begin with it, unless they are told otherwise
+    /// ([`InitialCovariance`](crate::InitialCovariance)); a simulation does not use it.
+    #[inline]
+    fn initial_noise<S: Scalar>(&self, _p: &Of<Self::Parameters, S>) -> Of<Self::State, S> {
+        Self::State::splat(S::from(0.0))
+    }
+
     /// Dead time of each input (s): at time `t` the model has the input of as much earlier; before the first sample, that of the first
     /// sample. Zero unless written. Continuous models see a held input jump between samples; a discrete or static one has the input that holds at
     /// the sample. One that is negative or not finite fails the simulation, which names it. Online observers refuse a dead time

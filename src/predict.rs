@@ -4,22 +4,26 @@ mod free_run;
 mod gaussian;
 mod given_noise;
 mod horizon;
+mod initial;
 mod kalman;
 mod measured;
 mod plant;
 mod second_order;
+mod starting;
 mod symbolic;
 
 pub use crate::moments::Moments;
 pub use free_run::FreeRun;
 pub use given_noise::GivenNoise;
 pub use horizon::Horizon;
+pub use initial::InitialCovariance;
 pub use kalman::Kalman;
 pub use measured::Guess;
 pub(crate) use measured::Place;
 pub use plant::Plant;
 pub(crate) use plant::{Between, SlicePlant, Stepped};
 pub use second_order::SecondOrder;
+pub use starting::Starting;
 pub(crate) use symbolic::recurrence;
 
 use crate::error::Error;
@@ -27,6 +31,7 @@ use crate::graph::Symbol;
 use crate::integrate::{Duals, Stuck};
 use crate::layout::Layout;
 use crate::scalar::Scalar;
+use core::any::Any;
 use core::fmt::Debug;
 use std::sync::Arc;
 
@@ -70,9 +75,18 @@ pub trait Predictor: Debug + Clone + Send + Sync + 'static {
         Ok(())
     }
 
+    /// What the entries of the carry after the state depend on at the first sample; slopes with respect to anything else are zero there.
+    fn starts_from(&self) -> StartsFrom {
+        StartsFrom::Anything
+    }
+
     /// Sets the entries of the carry after the state, at the first sample.
-    fn start<S: Scalar>(&self, plant: &dyn Plant<S>, carry: &mut [S]) {
+    ///
+    /// # Errors
+    /// A plant that is unstable where these do not exist then.
+    fn start<S: Scalar>(&self, plant: &dyn Plant<S>, carry: &mut [S]) -> Result<(), Unstable> {
         let _ = (plant, carry);
+        Ok(())
     }
 
     /// Mean and variance of an output, from a carry that was corrected with the outputs before it. The variance is
@@ -98,6 +112,26 @@ pub trait Predictor: Debug + Clone + Send + Sync + 'static {
     fn describe(&self) -> String;
 }
 
+/// What the entries of a carry after the state depend on at the first sample.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum StartsFrom {
+    /// States and parameters, as it may be.
+    Anything,
+    /// The parameters of [`Plant::initial_noise`].
+    InitialNoise,
+    /// What [`Plant::state_slopes`] and [`Plant::diffusion`] depend on.
+    Slopes,
+}
+
+/// A plant that is unstable where a predictor starts from its stationary covariance.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Unstable {
+    /// Number of the state that does not come to rest.
+    pub state: usize,
+    /// By what it grows, about: the real part of an eigenvalue (1/s) of a continuous plant, the logarithm of its magnitude of a discrete one.
+    pub rate: f64,
+}
+
 /// An output of the state that begins the carry.
 fn mean<S: Scalar>(plant: &dyn Plant<S>, carry: &[S], output: usize) -> S {
     let mut y = vec![S::from(0.0); plant.layout().outputs.len()];
@@ -112,6 +146,7 @@ pub(crate) trait Prediction: Debug + Send + Sync {
     fn restarts(&self) -> Option<Horizon>;
     fn is_simulation(&self) -> bool;
     fn needs_slopes(&self) -> bool;
+    fn starts_from(&self) -> StartsFrom;
     /// This predictor to the second order, of a filter of first order.
     fn second_order(&self) -> Option<Arc<dyn Prediction>>;
     fn check(&self, layout: &Layout) -> Result<(), Error>;
@@ -123,15 +158,15 @@ pub(crate) trait Prediction: Debug + Send + Sync {
 
 /// The functions of a [`Predictor`] in numbers of one type.
 pub(crate) trait Steps<S> {
-    fn start(&self, plant: &dyn Plant<S>, carry: &mut [S]);
+    fn start(&self, plant: &dyn Plant<S>, carry: &mut [S]) -> Result<(), Unstable>;
     fn predict(&self, plant: &dyn Plant<S>, carry: &[S], output: usize) -> (S, S);
     fn correct(&self, plant: &dyn Plant<S>, carry: &mut [S], output: usize, error: S);
     fn advance(&self, plant: &dyn Plant<S>, carry: &mut [S]) -> Result<(), Stuck>;
 }
 
 impl<P: Predictor, S: Scalar> Steps<S> for P {
-    fn start(&self, plant: &dyn Plant<S>, carry: &mut [S]) {
-        Predictor::start(self, plant, carry);
+    fn start(&self, plant: &dyn Plant<S>, carry: &mut [S]) -> Result<(), Unstable> {
+        Predictor::start(self, plant, carry)
     }
 
     fn predict(&self, plant: &dyn Plant<S>, carry: &[S], output: usize) -> (S, S) {
@@ -168,9 +203,16 @@ impl<P: Predictor> Prediction for P {
         Predictor::needs_slopes(self)
     }
 
+    fn starts_from(&self) -> StartsFrom {
+        Predictor::starts_from(self)
+    }
+
     fn second_order(&self) -> Option<Arc<dyn Prediction>> {
-        let is_first = std::any::TypeId::of::<P>() == std::any::TypeId::of::<Kalman>();
-        is_first.then(|| Arc::new(SecondOrder) as Arc<dyn Prediction>)
+        let this: &dyn Any = self;
+        match this.downcast_ref::<Starting<Kalman>>() {
+            Some(starting) => Some(Arc::new(starting.second_order())),
+            None => this.is::<Kalman>().then(|| Arc::new(SecondOrder) as Arc<dyn Prediction>),
+        }
     }
 
     fn check(&self, layout: &Layout) -> Result<(), Error> {

@@ -19,6 +19,7 @@ mod segments;
 mod settings;
 mod simulate;
 mod standardize;
+mod states;
 mod together;
 mod unknowns;
 mod weighing;
@@ -111,6 +112,7 @@ impl<'a> Problem<'a> {
         settings.check(sweep.layout(), &records)?;
         let unknowns = Arc::new(Unknowns::new(&*sweep, &records, parameters)?);
         let prepared = Problem::prepared(&*sweep, &records, parameters)?;
+        unknowns.check_starts(&*sweep, &records)?;
         let settings = settings.of(&*sweep);
         let kappa = match &settings.loss {
             Some(loss) if sweep.predicts_variance() => expected_slope(&**loss),

@@ -17,6 +17,8 @@ pub struct Recurrence {
     next: Vec<Id>,
     mean: Vec<Id>,
     variance: Vec<Id>,
+    /// From which carried entry on, and the states and parameters on which their start depends.
+    started: (usize, Vec<Leaf>),
 }
 
 /// Roots that make no recurrence.
@@ -46,7 +48,18 @@ impl Recurrence {
     /// A recurrence that carries no outputs.
     pub(crate) fn without_outputs(&self) -> Self {
         let (graph, next) = self.graph.pruned(&self.next);
-        Recurrence { graph, next, mean: vec![], variance: vec![] }
+        Recurrence { graph, next, mean: vec![], variance: vec![], started: self.started.clone() }
+    }
+
+    /// This recurrence, where the start of the entries from `first` on depends on these states and parameters.
+    pub(crate) fn started(self, first: usize, from: Vec<Leaf>) -> Self {
+        Recurrence { started: (first, from), ..self }
+    }
+
+    /// Whether the start of an entry depends on a state or a parameter.
+    pub(crate) fn starts_from(&self, entry: usize, leaf: Leaf) -> bool {
+        let (first, from) = &self.started;
+        entry >= *first && from.contains(&leaf)
     }
 
     /// A recurrence by the nodes of what is carried next, of the outputs' means, and of their variances, if it has any.
@@ -67,7 +80,8 @@ impl Recurrence {
         }
         let (next, rest) = roots.split_at(next.len());
         let (mean, variance) = rest.split_at(mean.len());
-        Ok(Recurrence { next: next.to_vec(), mean: mean.to_vec(), variance: variance.to_vec(), graph })
+        let started = (next.len(), vec![]);
+        Ok(Recurrence { next: next.to_vec(), mean: mean.to_vec(), variance: variance.to_vec(), graph, started })
     }
 
     /// The arithmetic.

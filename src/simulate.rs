@@ -1,5 +1,7 @@
 //! [`simulate`]: what a model does with given parameters, and records made of it.
 
+mod disturbed;
+
 use crate::error::{Error, Failure};
 use crate::experiment::{Experiment, ExperimentOf};
 use crate::integrate::{Automatic, Integrator, Method, ModelSystem, Stuck};
@@ -10,6 +12,7 @@ use crate::numeral::TimeUnit;
 use crate::random::Random;
 use crate::record::{Channel, NO_DEAD_TIME, Part, Record, Time, is_dead_time};
 use crate::signals::{Of, Signals};
+use disturbed::Disturbance;
 
 /// Simulates a model from an initial state, its inputs held from sample to sample, by the step that its kind asks for;
 /// [`Simulator`] has the choice.
@@ -45,12 +48,13 @@ pub fn simulate<M: Model>(
     Simulator::new(model).run(parameters, initial, time, inputs)
 }
 
-/// A simulation about to be run: the method and the hold of the inputs.
+/// A simulation about to be run: the method, the hold of the inputs, and whether the plant is disturbed.
 #[derive(Clone, Debug)]
 pub struct Simulator<'a, M, I = Automatic> {
     model: &'a M,
     integrator: I,
     hold: Hold,
+    disturbed: Option<u64>,
 }
 
 impl<'a, M: Model> Simulator<'a, M> {
@@ -60,19 +64,47 @@ impl<'a, M: Model> Simulator<'a, M> {
     /// one sample comes out 2 % off. Where the simulation stands for a plant, take [`Rk45`](crate::Rk45) or
     /// [`Esdirk`](crate::Esdirk).
     pub fn new(model: &'a M) -> Self {
-        Simulator { model, integrator: Automatic::default(), hold: Hold::default() }
+        Simulator { model, integrator: Automatic::default(), hold: Hold::default(), disturbed: None }
     }
 }
 
 impl<'a, M: Model, I: Integrator> Simulator<'a, M, I> {
     /// Steps the model by another method.
     pub fn integrator<J: Integrator>(self, integrator: J) -> Simulator<'a, M, J> {
-        Simulator { model: self.model, integrator, hold: self.hold }
+        Simulator { model: self.model, integrator, hold: self.hold, disturbed: self.disturbed }
     }
 
     /// Says how the inputs behave between samples.
     pub fn hold(self, hold: Hold) -> Self {
         Simulator { hold, ..self }
+    }
+
+    /// Disturbs the state by the process noise of the model ([`Model::diffusion`]); the same seed draws the same. After each interval a normal number
+    /// is added, with the covariance that noise leaves there with the slopes of the model at its begin: exact of a model that is affine in its
+    /// state, of others to the first order in the length of the interval.
+    ///
+    /// ```
+    /// # use greybox::{Kind, Model, Nothing, Scalar, Simulator, Time, signals};
+    /// # signals! { pub struct Level { x: "m" } }
+    /// # signals! { pub struct Rates { a: "1/s", q: "m/s^0.5" } }
+    /// # struct Drift;
+    /// # impl Model for Drift {
+    /// #     type State = Level;
+    /// #     type Input = Nothing;
+    /// #     type Output = Level;
+    /// #     type Parameters = Rates;
+    /// #     fn derivative<S: Scalar>(&self, _t: S, x: &Level<S>, _u: &Nothing, p: &Rates<S>) -> Level<S> { Level { x: -(p.a * x.x) } }
+    /// #     fn output<S: Scalar>(&self, _t: S, x: &Level<S>, _u: &Nothing, _p: &Rates<S>) -> Level<S> { *x }
+    /// #     fn diffusion<S: Scalar>(&self, p: &Rates<S>) -> Level<S> { Level { x: p.q } }
+    /// # }
+    /// let (truth, time) = (Rates { a: 0.5, q: 0.2 }, Time::Uniform { start: 0.0, step: 1.0 });
+    /// let run = Simulator::new(&Drift).disturbed(7).run(&truth, &Level { x: 0.0 }, time, &[Nothing; 2000])?;
+    /// let variance = run.states.iter().map(|x| x.x * x.x).sum::<f64>() / 2000.0;
+    /// assert!((variance / 0.04 - 1.0).abs() < 0.2); // q^2 / 2a
+    /// # Ok::<(), greybox::Error>(())
+    /// ```
+    pub fn disturbed(self, seed: u64) -> Self {
+        Simulator { disturbed: Some(seed), ..self }
     }
 
     /// Simulates from the initial state; one sample for each row of inputs.
@@ -91,6 +123,7 @@ impl<'a, M: Model, I: Integrator> Simulator<'a, M, I> {
         let late = self.late(parameters, &time, inputs)?;
         let mut x = *initial;
         let mut step = 0.0;
+        let mut disturbance = self.disturbed.map(|seed| Disturbance::new(M::State::LEN, seed));
         let (mut states, mut outputs) = (Vec::with_capacity(inputs.len()), Vec::with_capacity(inputs.len()));
         for (k, u) in inputs.iter().enumerate() {
             finite::<M::State>("state", &x, k, &time)?;
@@ -106,10 +139,15 @@ impl<'a, M: Model, I: Integrator> Simulator<'a, M, I> {
                 Some(late) => &late.parts::<M::Input>(M::KIND, k)[..],
                 None => &[interval],
             };
+            let begin = x;
             for interval in parts {
                 x = ModelSystem { model: self.model, interval, p: parameters }
                     .step(&self.integrator, x, &mut step)
                     .map_err(|Stuck| failure("the progress of the integrator".to_owned(), 0.0, k, &time))?;
+            }
+            if let (Some(disturbance), Some(first)) = (&mut disturbance, parts.first()) {
+                let system = ModelSystem { model: self.model, interval: first, p: parameters };
+                x = disturbance.add(&system, &begin, time.at(k + 1) - time.at(k), &x);
             }
         }
         Ok(Simulation { time, hold: self.hold, inputs: inputs.to_vec(), states, outputs })

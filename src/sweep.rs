@@ -11,6 +11,7 @@ mod loops;
 mod made;
 mod model_code;
 mod programs;
+mod states;
 mod window;
 
 pub(crate) use duals::DualSweep;
@@ -19,10 +20,11 @@ pub(crate) use loops::{Loops, Narrow};
 pub(crate) use made::{compiled, of_equations};
 pub(crate) use model_code::{Evaluated, ModelCode, Typed};
 pub(crate) use programs::{Derived, Interleaved, ProgramSweep};
+pub use states::States;
 pub use window::Window;
 
 pub use crate::graph::Seed;
-pub use crate::predict::Guess;
+pub use crate::predict::{Guess, Unstable};
 
 use crate::error::{Error, Failure};
 use crate::layout::Layout;
@@ -155,9 +157,12 @@ pub trait Sweep: Send + Sync {
 
     /// The carry at the first sample from the initial state, and its slopes with respect to states, then parameters,
     /// row by row.
-    fn start(&self, record: &Record, state: &[f64], parameters: &[f64]) -> Reached {
+    ///
+    /// # Errors
+    /// A plant that is unstable where the predictor cannot start from one that is.
+    fn start(&self, record: &Record, state: &[f64], parameters: &[f64]) -> Result<Reached, Unstable> {
         let _ = record;
-        unmoved(state, parameters)
+        Ok(unmoved(state, parameters))
     }
 
     /// Runs pieces in parallel lanes and calls `visit` with each window.
@@ -232,6 +237,19 @@ pub trait Sweep: Send + Sync {
     /// The extended filter of the same equations and method with these levels of noise; `None` where the slopes of the equations are not known.
     fn filtering<'s>(&'s self, noise: &GivenNoise) -> Option<Arc<dyn Sweep + 's>> {
         let _ = noise;
+        None
+    }
+
+    /// The states of a record by a Kalman filter, from the carry at the first sample: after each sample's measurements, or `smoothed` by all of
+    /// them; `None` of other predictors. The error is the sample that could not be reached or predicted.
+    fn states(
+        &self,
+        record: &Record,
+        carry: &[f64],
+        parameters: &[f64],
+        smoothed: bool,
+    ) -> Option<Result<States, usize>> {
+        let _ = (record, carry, parameters, smoothed);
         None
     }
 

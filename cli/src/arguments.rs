@@ -155,7 +155,7 @@ pub struct FitOptions {
     /// A filter of the errors: order and cut-off (Hz), `low-pass:4,100`, `high-pass:2,0.5`.
     #[arg(long, value_name = "FILTER")]
     pub prefilter: Option<String>,
-    /// What is predicted: simulation, `horizon:5` (samples), kalman, second-order.
+    /// What is predicted: simulation, `horizon:5` (samples), kalman, second-order, with `:stationary` or `:first-interval` for its start.
     #[arg(long)]
     pub predictor: Option<String>,
     /// The integrator: automatic, `rk4:4` (steps per sample), `rk45:1e-8`, `esdirk:1e-8`, discrete.

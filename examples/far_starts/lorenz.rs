@@ -78,12 +78,12 @@ fn deviation(values: impl Iterator<Item = f64> + Clone) -> f64 {
 fn measured(random: &mut Random, outputs: &[Flow]) -> Vec<Flow> {
     let noise = |of: fn(&Flow) -> f64| NOISE * deviation(outputs.iter().map(of));
     let (x, y, z) = (noise(|flow| flow.x), noise(|flow| flow.y), noise(|flow| flow.z));
-    let mut noisy = |flow: &Flow| Flow {
+    let noisy = |flow: &Flow| Flow {
         x: flow.x + x * random.normal(),
         y: flow.y + y * random.normal(),
         z: flow.z + z * random.normal(),
     };
-    outputs.iter().map(|flow| noisy(flow)).collect()
+    outputs.iter().map(noisy).collect()
 }
 
 fn start(random: &mut Random) -> Constants<greybox::Parameter> {

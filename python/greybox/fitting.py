@@ -81,7 +81,8 @@ def fit(
     predictor : str, optional
         Which prediction error is minimized: of a ``"simulation"`` (the default), ``"horizon:5"`` (five samples ahead of a measured
         state), ``"kalman"`` (one-step errors of a filter, for disturbed plants; the model has `diffusion` and `noise`), or
-        ``"second-order"`` (a filter for strong noise).
+        ``"second-order"`` (a filter for strong noise). After a colon stands the covariance at the first sample, if it is not what
+        `initial_noise` of the model says: ``"kalman:stationary"``, ``"kalman:first-interval"``.
     optimizer : str, optional
         ``"levenberg-marquardt"`` or ``"gauss-newton"``.
     starts : int, optional

@@ -32,6 +32,7 @@ class Model:
     ``output(t, x, u, p)``     each output; may be left out where all outputs are states
     ``diffusion(p)``           the intensity of the process noise of each state, for a Kalman predictor
     ``noise(p)``               the standard deviation of the noise of each output, for a Kalman predictor
+    ``initial_noise(p)``       the standard deviation of each state at the first sample, for a Kalman predictor
     ``delay(p)``               the dead time of each input (s)
     ========================== =======================================================================
 
@@ -87,6 +88,10 @@ class Model:
     def noise(self, p: Vector) -> Returned:
         """Give the standard deviation of the noise of each output."""
         raise NotImplementedError(f"{type(self).__name__} has no method noise(self, p)")
+
+    def initial_noise(self, p: Vector) -> Returned:
+        """Give the standard deviation of each state at the first sample."""
+        raise NotImplementedError(f"{type(self).__name__} has no method initial_noise(self, p)")
 
     def delay(self, p: Vector) -> Returned:
         """Give the dead time of each input (s)."""
@@ -169,6 +174,7 @@ def model(
     output: Callable[..., Returned] | None = None,
     diffusion: Callable[..., Returned] | None = None,
     noise: Callable[..., Returned] | None = None,
+    initial_noise: Callable[..., Returned] | None = None,
     delay: Callable[..., Returned] | None = None,
     states: SignalsLike = (),
     inputs: SignalsLike = (),
@@ -181,7 +187,7 @@ def model(
     ----------
     derivative, next, output : callable, optional
         As the methods of :class:`Model`, without ``self``.
-    diffusion, noise, delay : callable, optional
+    diffusion, noise, initial_noise, delay : callable, optional
         The same, of ``p`` alone.
     states, inputs, outputs, parameters : Signals, mapping from names to units, or names
         The quantities.
@@ -197,7 +203,7 @@ def model(
     d(body)/dt = k * (room - body)
     output body = body
     """
-    levels = {"diffusion": diffusion, "noise": noise, "delay": delay}
+    levels = {"diffusion": diffusion, "noise": noise, "initial_noise": initial_noise, "delay": delay}
     functions = {"derivative": derivative, "next": next, "output": output, **levels}
     given = {name: function for name, function in functions.items() if function is not None}
     return _Functions(given, {"states": states, "inputs": inputs, "outputs": outputs, "parameters": parameters})
@@ -267,7 +273,7 @@ def _roots(
 
     x, u, p = vector("states", graph.state), vector("inputs", graph.input), vector("parameters", graph.parameter)
     output = _written(of, "output") or (lambda *args: Model.output(of, *args))
-    diffusion, noise, delay = _written(of, "diffusion"), _written(of, "noise"), _written(of, "delay")
+    roles = {"diffusion": "states", "noise": "outputs", "initial_noise": "states", "delay": "inputs"}
 
     def nodes(role: str, function: Callable[..., Returned] | None, name: str, *args: Any) -> list[_core.Node]:
         if function is None:
@@ -283,9 +289,7 @@ def _roots(
     return [
         nodes("states", state, name, t, x, u, p),
         nodes("outputs", output, "output", t, x, u, p),
-        nodes("states", diffusion, "diffusion", p),
-        nodes("outputs", noise, "noise", p),
-        nodes("inputs", delay, "delay", p),
+        *(nodes(role, _written(of, name), name, p) for name, role in roles.items()),
     ]
 
 

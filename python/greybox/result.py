@@ -97,12 +97,50 @@ class Fit(Estimate):
             **{f"{name}_residual": column for name, column in errors.items()},
         }
 
+    def filtered(self, data: Any = None, /, **said: Any) -> Any:
+        """Give the states of a record after each sample's measurements, by the fit's Kalman filter.
+
+        The arguments are those of :meth:`predict`.
+
+        Returns
+        -------
+        frame
+            Of the caller's kind: ``t``, and of each state the mean, ``id``, and its standard deviation, ``id_deviation``; of several
+            records, ``record`` before.
+
+        Raises
+        ------
+        Error
+            If the predictor is not ``"kalman"``.
+        """
+        return self._states(data, said, False)
+
+    def smoothed(self, data: Any = None, /, **said: Any) -> Any:
+        """Give the states of a record by all its measurements, before each sample and after it, as :meth:`filtered` otherwise.
+
+        The parameters and estimated initial states count as known.
+        """
+        return self._states(data, said, True)
+
+    def _states(self, data: Any, said: Mapping[str, Any], smoothed: bool) -> Any:
+        states = list(named(self._equations.states, "states"))
+        cores = self._asked(data, said)
+        parts: list[dict[str, Array]] = []
+        for k, core in enumerate(cores):
+            means, deviations = self._problem.states(self._estimate, core, k if data is None else None, smoothed)
+            spreads = {f"{name}_deviation": one for name, one in zip(states, deviations, strict=True)}
+            parts.append(dict(zip(states, means, strict=True)) | spreads)
+        return self._kind(_stacked(cores, parts))
+
+    def _asked(self, data: Any, said: Mapping[str, Any]) -> list[_core.Record]:
+        if data is None:
+            return self._records
+        record = data if isinstance(data, Record) else Record(data, **said)
+        return [record.core(self._equations, "record", outputs=False)]
+
     def _predicted(self, data: Any, said: Mapping[str, Any], chosen: Any, kind: Kind | None = None) -> Any:
         outputs = list(named(self._equations.outputs, "outputs"))
-        cores = self._records
-        if data is not None:
-            record = data if isinstance(data, Record) else Record(data, **said)
-            cores = [record.core(self._equations, "record", outputs=False)]
+        cores = self._asked(data, said)
         parts: list[dict[str, Array]] = []
         for k, core in enumerate(cores):
             predicted, errors, _ = self._problem.predict(self._estimate, core, k if data is None else None)

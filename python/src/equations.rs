@@ -3,6 +3,7 @@
 use crate::convert::{name_of, named, raised};
 use crate::graph::{Graph, Node};
 use crate::record::Record;
+use greybox::equations::Roots;
 use greybox::graph::Id;
 use greybox::layout::{Layout, Quantity};
 use greybox::{Fit, fixed};
@@ -29,20 +30,20 @@ fn names(of: &[Quantity]) -> Names {
 #[pymethods]
 impl Equations {
     /// Equations of quantities (states, inputs, outputs, parameters) and roots of a graph (derivatives or next states, outputs,
-    /// diffusions, noises, dead times).
+    /// diffusions, noises, initial noises, dead times).
     #[new]
-    #[expect(clippy::needless_pass_by_value, reason = "arguments of Python come as values")]
     fn new(
         kind: &str,
         quantities_by_role: [Names; 4],
         graph: &Graph,
-        roots: [Vec<PyRef<'_, Node>>; 5],
+        roots: [Vec<PyRef<'_, Node>>; 6],
     ) -> PyResult<Self> {
         let [states, inputs, outputs, parameters] = quantities_by_role.map(quantities);
         let layout = Layout { kind: named(kind)?, states, inputs, outputs, parameters };
-        let roots: Vec<Vec<Id>> = roots.iter().map(|nodes| nodes.iter().map(|node| node.0).collect()).collect();
-        let roots = [0, 1, 2, 3, 4].map(|i| &*roots[i]);
-        let equations = greybox::equations::Equations::complete(layout, &graph.0, roots);
+        let ids = |nodes: Vec<PyRef<'_, Node>>| nodes.iter().map(|node| node.0).collect::<Vec<Id>>();
+        let [state, output, diffusion, noise, initial_noise, delay] = roots.map(ids);
+        let roots = Roots { state, output, diffusion, noise, initial_noise, delay };
+        let equations = greybox::equations::Equations::complete(layout, &graph.0, &roots);
         Ok(Equations(Arc::new(equations.map_err(raised)?)))
     }
 

@@ -72,16 +72,29 @@ impl Problem {
         record: &Record,
         own: Option<usize>,
     ) -> PyResult<(Arrays<'py>, Arrays<'py>, Vec<f64>)> {
-        let (mut summary, mut record) = (estimate.0.clone(), record.record.clone());
-        if let Some(one) = own.and_then(|own| estimate.0.experiments.get(own)) {
-            let initial = one.initial_state.iter().copied().map(greybox::fixed).collect();
-            record = record.initial(greybox::record::Initial::Given(initial)).map_err(raised)?;
-            let values = one.parameters.iter();
-            summary.parameters.iter_mut().zip(values).for_each(|(parameter, value)| parameter.value = *value);
-        }
+        let (summary, record) = of_record(estimate, record, own)?;
         let found = self.whole(py, None, || self.problem.predict(&summary, &record))?;
         let arrays = |columns: Vec<Vec<f64>>| columns.into_iter().map(|one| PyArray1::from_vec(py, one)).collect();
         Ok((arrays(found.outputs), arrays(found.residuals), found.initial_state))
+    }
+
+    /// The states of a record, filtered or smoothed, with their standard deviations, a column per state; of record `own` of the fit as
+    /// `predict`.
+    fn states<'py>(
+        &self,
+        py: Python<'py>,
+        estimate: &Estimate,
+        record: &Record,
+        own: Option<usize>,
+        smoothed: bool,
+    ) -> PyResult<(Arrays<'py>, Arrays<'py>)> {
+        let (summary, record) = of_record(estimate, record, own)?;
+        let found = self.whole(py, None, || match smoothed {
+            true => self.problem.smoothed(&summary, &record),
+            false => self.problem.filtered(&summary, &record),
+        })?;
+        let arrays = |columns: Vec<Vec<f64>>| columns.into_iter().map(|one| PyArray1::from_vec(py, one)).collect();
+        Ok((arrays(found.means), arrays(found.deviations)))
     }
 
     /// The profile of an unknown: ends, values, rises, threshold, remark, and the profile as JSON.
@@ -136,6 +149,22 @@ impl Problem {
         let arrays = |columns: Vec<Vec<f64>>| columns.into_iter().map(|one| PyArray1::from_vec(py, one)).collect();
         Ok((arrays(found.confidence), arrays(found.prediction)))
     }
+}
+
+/// The estimate and the record that a question is about: record `own` of the fit has its own parameters and estimated initial state.
+fn of_record(
+    estimate: &Estimate,
+    record: &Record,
+    own: Option<usize>,
+) -> PyResult<(greybox::Summary, greybox::record::Record)> {
+    let (mut summary, mut record) = (estimate.0.clone(), record.record.clone());
+    if let Some(one) = own.and_then(|own| estimate.0.experiments.get(own)) {
+        let initial = one.initial_state.iter().copied().map(greybox::fixed).collect();
+        record = record.initial(greybox::record::Initial::Given(initial)).map_err(raised)?;
+        let values = one.parameters.iter();
+        summary.parameters.iter_mut().zip(values).for_each(|(parameter, value)| parameter.value = *value);
+    }
+    Ok((summary, record))
 }
 
 impl Problem {

@@ -54,6 +54,29 @@ def test_predictions(fitted: gb.Fit, motor: pd.DataFrame) -> None:
         fitted.predict(motor.drop(columns=["id", "iq"]))
 
 
+def test_states() -> None:
+    rng = np.random.default_rng(3)
+    level = np.cumsum(0.1 * rng.normal(size=300))
+    frame = pd.DataFrame({"t": np.arange(300.0), "y": level + 0.3 * rng.normal(size=300)})
+    model = gb.model(
+        next=lambda t, x, u, p: [x.level], output=lambda t, x, u, p: [x.level], diffusion=lambda p: [p.q], noise=lambda p: [p.r],
+        initial_noise=lambda p: [1.0], states=["level"], outputs=["y"], parameters=["q", "r"],
+    )
+    start = {"q": gb.free(0.2).log(), "r": gb.free(0.2).log()}
+    found = gb.fit(model, frame, parameters=start, time="t", initial={"level": gb.fixed(0.0)}, predictor="kalman")
+    filtered, smoothed = found.filtered(), found.smoothed()
+    assert list(smoothed.columns) == ["t", "level", "level_deviation"] and len(smoothed) == 300
+    # The last sample has nothing after it; before it, less is left.
+    assert smoothed["level"].iloc[-1] == pytest.approx(filtered["level"].iloc[-1], abs=1e-12)
+    assert (smoothed["level_deviation"][:-1] < filtered["level_deviation"][:-1]).all()
+    # Of 300 correlated samples.
+    inside = (np.abs(smoothed["level"] - level) < 1.96 * smoothed["level_deviation"]).mean()
+    assert inside > 0.85
+    assert found.smoothed(frame, time="t", initial={"level": gb.fixed(0.0)}).equals(smoothed)
+    with pytest.raises(gb.Error, match="Kalman"):
+        gb.fit(model, frame, parameters=start | {"q": gb.fixed(0.1)}, time="t").smoothed()
+
+
 def test_reports(fitted: gb.Fit, tmp_path: Path) -> None:
     report = fitted.report(tmp_path / "r.html", title="Motor 7", profiles=["rs"])
     page = (tmp_path / "r.html").read_text()

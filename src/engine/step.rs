@@ -1,7 +1,7 @@
 //! [`Step`]: a recurrence with its slopes, ready to be scheduled.
 
 use super::fusion::instructions;
-use crate::graph::{Function, Graph, Id, Node, Pattern, Seed, Tangent, Tape, Variables, Way, slopes};
+use crate::graph::{Function, Graph, Id, Leaf, Node, Pattern, Seed, Tangent, Tape, Variables, Way, slopes};
 use crate::recurrence::Recurrence;
 
 /// Everything computed at a sample: rows, and what is carried on.
@@ -33,7 +33,8 @@ impl Step {
         let all = [recurrence.next(), recurrence.mean(), recurrence.variance()].concat();
         let roots = tape.import(recurrence.graph(), &all);
         let (next, outputs) = roots.split_at(recurrence.next().len());
-        let pattern = Pattern::new(&mut tape, next, seeds);
+        let starts = |entry: usize, leaf: Leaf| recurrence.starts_from(entry, leaf);
+        let pattern = Pattern::new(&mut tape, next, seeds, &starts);
         let attempt = best(&tape, outputs, next, seeds, &pattern);
         let mut values: Vec<Id> = next.to_vec();
         for (row, tangent) in pattern.rows.iter().zip(&attempt.next) {

@@ -21,7 +21,7 @@ impl Equations {
     /// The dead times that differ, and which one each input has.
     pub(crate) fn dead_times(&self) -> DeadTimes {
         let (mut roots, mut of) = (vec![], vec![None; self.layout.inputs.len()]);
-        for (of, id) in of.iter_mut().zip(&self.delay).filter(|(_, id)| self.graph.known(**id) != Some(0.0)) {
+        for (of, id) in of.iter_mut().zip(&self.roots.delay).filter(|(_, id)| self.graph.known(**id) != Some(0.0)) {
             let known = roots.iter().position(|root| root == id);
             *of = known.or(Some(roots.len()));
             if known.is_none() {

@@ -25,7 +25,7 @@ impl Slopes {
     pub fn of(equations: &Equations) -> Self {
         let states = equations.layout().states.len();
         let of = |roots: &[Id]| Jacobian::of(equations.graph(), roots, states);
-        Slopes { state: of(equations.state()), output: of(equations.output()) }
+        Slopes { state: of(&equations.roots().state), output: of(&equations.roots().output) }
     }
 }
 

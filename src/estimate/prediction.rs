@@ -1,9 +1,10 @@
-//! [`Prediction`]: what an estimate says of a record.
+//! [`Prediction`] and [`StatesOf`]: what an estimate says of a record.
 
 use super::OutputFit;
 use crate::model::Model;
 use crate::problem::Simulated;
 use crate::signals::Of;
+use crate::sweep::States;
 
 /// Prediction of a record by an estimate, beside the measured outputs.
 #[derive(Debug)]
@@ -26,4 +27,17 @@ impl<M: Model> AsRef<Simulated> for Prediction<M> {
     fn as_ref(&self) -> &Simulated {
         &self.columns
     }
+}
+
+/// The states of a record by an estimate, filtered or smoothed.
+#[derive(Debug)]
+pub struct StatesOf<M: Model> {
+    /// Time of each sample (s).
+    pub t: Vec<f64>,
+    /// The mean at each sample.
+    pub means: Vec<Of<M::State, f64>>,
+    /// The standard deviation at each sample.
+    pub deviations: Vec<Of<M::State, f64>>,
+    /// The same by columns, with covariances.
+    pub columns: States,
 }

@@ -8,7 +8,7 @@ use crate::layout::Quantity;
 use crate::loss::{Cauchy, Huber, SoftL1, Tukey};
 use crate::optimize::{GaussNewton, LevenbergMarquardt};
 use crate::parameter::Parameter;
-use crate::predict::{FreeRun, Horizon, Kalman, SecondOrder};
+use crate::predict::{FreeRun, Horizon, InitialCovariance, Kalman, SecondOrder};
 use crate::prefilter::Butterworth;
 use crate::problem::Noise;
 use crate::scaling::{JacobianColumns, OwnSize, Unscaled};
@@ -97,18 +97,31 @@ impl<M: Made> Fit<'_, M> {
         })
     }
 
-    /// Sets the predictor by its name: `simulation`, `horizon:5` (samples), `kalman`, `second-order`.
+    /// Sets the predictor by its name: `simulation`, `horizon:5` (samples), `kalman` or `second-order`, the last two with the
+    /// [`InitialCovariance`] after a colon, if it is not the default: `kalman:stationary`, `kalman:first-interval`.
     ///
     /// # Errors
     /// A name that is none of these, a horizon that is not a whole number of samples.
     pub fn predictor_by_name(self, text: &str) -> Result<Self, Error> {
-        let (name, [steps]) = options("predictor", text)?;
-        match find("predictor", &["simulation", "horizon", "kalman", "second-order"], name)? {
-            0 => Ok(self.predictor(FreeRun)),
-            1 => Ok(self.predictor(Horizon::new(whole("predictor `horizon`", steps.unwrap_or(f64::NAN))? as usize))),
-            2 => Ok(self.predictor(Kalman)),
-            _ => Ok(self.predictor(SecondOrder)),
+        let name = text.split_once(':').map_or(text, |(name, _)| name).trim();
+        let predictor = find("predictor", &["simulation", "horizon", "kalman", "second-order"], name)?;
+        if predictor < 2 {
+            let (_, [steps]) = options("predictor", text)?;
+            return Ok(match predictor {
+                0 => self.predictor(FreeRun),
+                _ => self.predictor(Horizon::new(whole("predictor `horizon`", steps.unwrap_or(f64::NAN))? as usize)),
+            });
         }
+        let initial = text.split_once(':').map_or("declared", |(_, initial)| initial.trim());
+        let initial = match find("initial covariance", &["declared", "stationary", "first-interval"], initial)? {
+            0 => InitialCovariance::Declared,
+            1 => InitialCovariance::Stationary,
+            _ => InitialCovariance::FirstInterval,
+        };
+        Ok(match predictor {
+            2 => self.predictor(Kalman::starting(initial)),
+            _ => self.predictor(SecondOrder::starting(initial)),
+        })
     }
 
     /// Sets the integrator by its name: `automatic` (the default), `rk4:4` (steps per sample), `rk45:1e-8` and `esdirk:1e-8`

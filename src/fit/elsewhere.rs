@@ -179,7 +179,7 @@ impl Problem<'_> {
         let trials = Trials::of(FROM_A_START, found.iterations, self.settings.optimizer.most())?.most;
         let begin = Instant::now();
         if let Some((best, stages)) =
-            self.from_stages(trials, begin, control).filter(|(best, _)| !leaves_unexplained(best))
+            self.run_in_stages(trials, begin, control).filter(|(best, _)| !leaves_unexplained(best))
         {
             let (best, way) = (Box::new(best), Way::Stages(stages));
             return Some(Further::Found { best, way, stopped: control.stops(), time: begin.elapsed() });
@@ -204,7 +204,7 @@ impl Problem<'_> {
     }
 
     /// The estimate from where stages led the declared start, and how many; `None` where they led nowhere.
-    fn from_stages(&self, trials: u64, begin: Instant, control: &Control) -> Option<(Summary, u32)> {
+    fn run_in_stages(&self, trials: u64, begin: Instant, control: &Control) -> Option<(Summary, u32)> {
         let stages = self.stages().filter(|_| !self.settings.staged)?;
         let (start, stages) = stages.declared(control)?;
         let mut found = self.run_within(begin, control, Start { trials, ..start }).ok()?;
@@ -224,7 +224,7 @@ impl Problem<'_> {
         let Err(Error::Start(failure)) = found else { return found };
         let trials = self.settings.optimizer.most();
         let led = match self.settings.searches {
-            SearchPlan::Single => self.from_stages(trials, begin, control),
+            SearchPlan::Single => self.run_in_stages(trials, begin, control),
             SearchPlan::All(_) | SearchPlan::Best(_) => None,
         };
         let Some((mut found, stages)) = led else { return Err(Error::Start(failure)) };

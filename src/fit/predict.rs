@@ -1,22 +1,27 @@
-//! Prediction of a record by an estimate: a fit of the initial state alone.
+//! Prediction of a record by an estimate, and its states: a fit of the initial state alone.
 
 use super::Fit;
 use super::fittable::{Made, finer};
 use super::search::search;
 use crate::error::Error;
-use crate::estimate::{Estimate, Prediction, Summary};
+use crate::estimate::{Estimate, Prediction, StatesOf, Summary};
 use crate::experiment::ExperimentOf;
 use crate::model::Model;
 use crate::parameter::fixed;
-use crate::problem::{Control, Noise, Problem, Settings, Simulated};
+use crate::problem::{Control, Noise, Objective, Problem, Settings, Simulated};
 use crate::record::Record;
 use crate::residuals::output_fit;
 use crate::signals::Signals;
 use crate::sweep::Sweep;
 use std::sync::Arc;
 
-/// Predicts the outputs of a record with the parameters of an estimate.
-pub(super) fn predict<'a>(sweep: Arc<dyn Sweep + 'a>, record: &Record, estimate: &Summary) -> Result<Simulated, Error> {
+/// What is asked of a record with the parameters of an estimate, at the initial state that fits it best.
+pub(super) fn asked<'a, T>(
+    sweep: Arc<dyn Sweep + 'a>,
+    record: &Record,
+    estimate: &Summary,
+    ask: impl FnOnce(&Objective<'_>, &[f64]) -> Result<T, Error>,
+) -> Result<T, Error> {
     let parameters: Vec<_> = estimate.parameters.iter().map(|parameter| fixed(parameter.value)).collect();
     // An output without any error gives no noise level; it is then estimated from this record.
     let sigma = estimate.sigma();
@@ -32,7 +37,7 @@ pub(super) fn predict<'a>(sweep: Arc<dyn Sweep + 'a>, record: &Record, estimate:
             search(&objective, &problem.settings.optimizer, problem.unknowns.start())?.coordinates
         }
     };
-    objective.predict(0, &coordinates)
+    ask(&objective, &coordinates)
 }
 
 impl<M: Model> Fit<'_, M> {
@@ -42,12 +47,48 @@ impl<M: Model> Fit<'_, M> {
     /// # Errors
     /// As [`run`](Fit::run), and a simulation that fails.
     pub fn predict(&self, estimate: &Estimate<M>, record: &ExperimentOf<M>) -> Result<Prediction<M>, Error> {
+        let sweep = self.sweep_of(estimate)?;
+        let found = asked(sweep, record.record(), estimate, |objective, at| objective.predict(0, at))?;
+        Ok(typed(found, record))
+    }
+
+    /// The state after each sample's measurements, by a Kalman filter with the parameters of an estimate, on a record of the fit or a new
+    /// one; as [`predict`](Fit::predict) otherwise.
+    ///
+    /// # Errors
+    /// As [`predict`](Fit::predict); a predictor other than [`Kalman`](crate::Kalman).
+    pub fn filtered(&self, estimate: &Estimate<M>, record: &ExperimentOf<M>) -> Result<StatesOf<M>, Error> {
+        self.states(estimate, record, false)
+    }
+
+    /// The state at each sample by all measurements of the record, before it and after it: the mean and covariance of what is known of it in the
+    /// end (fixed-interval smoother of Rauch, Tung and Striebel, AIAA Journal 3 (1965) 1445-1450, extended where the model is not affine).
+    /// The parameters and an initial state that is estimated count as known.
+    ///
+    /// # Errors
+    /// As [`filtered`](Fit::filtered).
+    pub fn smoothed(&self, estimate: &Estimate<M>, record: &ExperimentOf<M>) -> Result<StatesOf<M>, Error> {
+        self.states(estimate, record, true)
+    }
+
+    fn states(&self, estimate: &Estimate<M>, record: &ExperimentOf<M>, smoothed: bool) -> Result<StatesOf<M>, Error> {
+        let sweep = self.sweep_of(estimate)?;
+        let columns = asked(sweep, record.record(), estimate, |objective, at| objective.states(0, at, smoothed))?;
+        let row = |of: &[Vec<f64>], k: usize| M::State::from_fn(|i| of[i][k]);
+        Ok(StatesOf {
+            t: (0..record.len()).map(|k| record.time(k)).collect(),
+            means: (0..record.len()).map(|k| row(&columns.means, k)).collect(),
+            deviations: (0..record.len()).map(|k| row(&columns.deviations, k)).collect(),
+            columns,
+        })
+    }
+
+    /// The sweep of this fit, by the method of the estimate, where the fit would have come to it by itself.
+    fn sweep_of(&self, estimate: &Estimate<M>) -> Result<Arc<dyn Sweep + '_>, Error> {
         let (stepping, predictor) = (self.stepping.as_ref(), self.predictor.as_ref());
         let sweep = M::sweep(self.model.lent(), stepping, predictor)?;
-        // The method of the estimate, where the fit would have come to it by itself.
         let finer = finer(self.model.lent(), stepping, predictor);
-        let sweep = finer.by_number(estimate.method.refinement).unwrap_or(sweep);
-        predict(sweep, record.record(), estimate).map(|found| typed(found, record))
+        Ok(finer.by_number(estimate.method.refinement).unwrap_or(sweep))
     }
 }
 

@@ -1,6 +1,7 @@
-//! Running a problem: search, estimate at a given point, objective, prediction.
+//! Running a problem: search, estimate at a given point, objective, prediction, states.
 
 use super::elsewhere::with_work_of;
+use super::predict::asked;
 use super::refine::{Attempt, Start};
 use super::search::{at_end, search, settled};
 use super::start_error::start_error;
@@ -10,7 +11,9 @@ use crate::error::Error;
 use crate::estimate::Summary;
 use crate::judge::conclude;
 use crate::optimize::{Domain, LeastSquares, LevenbergMarquardt};
-use crate::problem::{Control, Objective, Problem, Whitening, noise};
+use crate::problem::{Control, Objective, Problem, Simulated, Whitening, noise};
+use crate::record::Record;
+use crate::sweep::States;
 use std::time::Instant;
 
 static NEVER: Control = Control::NEVER;
@@ -203,12 +206,27 @@ impl Problem<'_> {
     ///
     /// # Errors
     /// As [`run`](Self::run), and a simulation that fails.
-    pub fn predict(
-        &self,
-        estimate: &Summary,
-        record: &crate::record::Record,
-    ) -> Result<crate::problem::Simulated, Error> {
+    pub fn predict(&self, estimate: &Summary, record: &Record) -> Result<Simulated, Error> {
         let problem = self.by_number(estimate.method.refinement);
-        super::predict::predict(problem.sweep.clone(), record, estimate)
+        asked(problem.sweep.clone(), record, estimate, |objective, at| objective.predict(0, at))
+    }
+
+    /// The state of a record after each sample's measurements, by the Kalman filter of this problem with the parameters of an estimate, as
+    /// [`Fit::filtered`](crate::Fit::filtered).
+    ///
+    /// # Errors
+    /// As [`predict`](Self::predict); a predictor other than [`Kalman`](crate::Kalman).
+    pub fn filtered(&self, estimate: &Summary, record: &Record) -> Result<States, Error> {
+        let problem = self.by_number(estimate.method.refinement);
+        asked(problem.sweep.clone(), record, estimate, |objective, at| objective.states(0, at, false))
+    }
+
+    /// The state at each sample by all measurements of the record, as [`Fit::smoothed`](crate::Fit::smoothed).
+    ///
+    /// # Errors
+    /// As [`filtered`](Self::filtered).
+    pub fn smoothed(&self, estimate: &Summary, record: &Record) -> Result<States, Error> {
+        let problem = self.by_number(estimate.method.refinement);
+        asked(problem.sweep.clone(), record, estimate, |objective, at| objective.states(0, at, true))
     }
 }

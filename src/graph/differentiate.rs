@@ -83,18 +83,21 @@ pub(crate) struct Pattern {
 }
 
 impl Pattern {
-    /// All slopes that may arise from unit slopes at the start, by what each next entry depends on.
-    pub fn new(tape: &mut Tape, next: &[Id], seeds: &[Seed]) -> Self {
+    /// All slopes that may arise from unit slopes at the start and from what else each entry `starts` from, by what each next entry
+    /// depends on.
+    pub fn new(tape: &mut Tape, next: &[Id], seeds: &[Seed], starts: &dyn Fn(usize, Leaf) -> bool) -> Self {
         let n = next.len();
+        let leaf = |seed: &Seed| match seed {
+            Seed::Carry(i) => state(*i),
+            Seed::Parameter(j) => Leaf::Parameter(u32::try_from(*j).unwrap_or(u32::MAX)),
+        };
         let mut all: Vec<Id> = (0..n).map(|i| tape.leaf(state(i))).collect();
-        all.extend(seeds.iter().map(|seed| match seed {
-            Seed::Carry(i) => tape.leaf(state(*i)),
-            Seed::Parameter(j) => tape.leaf(Leaf::Parameter(u32::try_from(*j).unwrap_or(u32::MAX))),
-        }));
+        all.extend(seeds.iter().map(|seed| tape.leaf(leaf(seed))));
         let influence = forward::influence(tape, &all, next);
         let parameter = |s: usize| matches!(seeds[s], Seed::Parameter(_));
-        let mut there: Vec<Vec<bool>> =
-            (0..n).map(|i| seeds.iter().map(|seed| *seed == Seed::Carry(i)).collect()).collect();
+        let mut there: Vec<Vec<bool>> = (0..n)
+            .map(|i| seeds.iter().map(|seed| *seed == Seed::Carry(i) || starts(i, leaf(seed))).collect())
+            .collect();
         let mut grew = true;
         while grew {
             grew = false;

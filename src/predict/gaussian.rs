@@ -1,15 +1,16 @@
 //! The filter of a state that is taken as Gaussian, by the moments of the model's functions: what [`Kalman`](super::Kalman) and
 //! [`SecondOrder`](super::SecondOrder) share.
 
-use super::{Moments, Plant};
+use super::{InitialCovariance, Moments, Plant, Predictor, StartsFrom, Unstable};
 use crate::error::Error;
 use crate::integrate::Stuck;
 use crate::layout::{Kind, Layout};
 use crate::moments::entry;
 use crate::scalar::Scalar;
+use core::fmt::Debug;
 
 /// How a filter finds the moments of the model's functions, from a state and the covariance after it.
-pub(super) trait Order {
+pub trait Order: 'static {
     /// Of the derivative at a fraction of the interval, or of the next state.
     fn state<S: Scalar>(plant: &dyn Plant<S>, position: f64, carry: &[S]) -> Moments<S>;
 
@@ -45,29 +46,7 @@ fn expected<O: Order, S: Scalar>(plant: &dyn Plant<S>, carry: &[S], output: usiz
     Expected { mean: mean[output], c, gain, noise, variance }
 }
 
-/// The state and its covariance.
-pub(super) fn carry(layout: &Layout) -> usize {
-    let n = layout.states.len();
-    n + n * (n + 1) / 2
-}
-
-pub(super) fn check(layout: &Layout) -> Result<(), Error> {
-    if layout.kind == Kind::Static {
-        return Err(Error::Option("a static model has no state to filter; leave the predictor out".to_owned()));
-    }
-    Ok(())
-}
-
-pub(super) fn start<S: Scalar>(plant: &dyn Plant<S>, carry: &mut [S]) {
-    carry[plant.layout().states.len()..].fill(S::from(0.0));
-}
-
-pub(super) fn predict<O: Order, S: Scalar>(plant: &dyn Plant<S>, carry: &[S], output: usize) -> (S, S) {
-    let Expected { mean, variance, .. } = expected::<O, S>(plant, carry, output);
-    (mean, variance)
-}
-
-pub(super) fn correct<O: Order, S: Scalar>(plant: &dyn Plant<S>, carry: &mut [S], output: usize, error: S) {
+fn correct<O: Order, S: Scalar>(plant: &dyn Plant<S>, carry: &mut [S], output: usize, error: S) {
     let n = plant.layout().states.len();
     let Expected { c, gain, noise, variance, .. } = expected::<O, S>(plant, carry, output);
     let part: Vec<S> = gain.iter().map(|gain| *gain / variance).collect();
@@ -89,7 +68,7 @@ pub(super) fn correct<O: Order, S: Scalar>(plant: &dyn Plant<S>, carry: &mut [S]
     }
 }
 
-pub(super) fn advance<O: Order, S: Scalar>(plant: &dyn Plant<S>, carry: &mut [S]) -> Result<(), Stuck> {
+fn advance<O: Order, S: Scalar>(plant: &dyn Plant<S>, carry: &mut [S]) -> Result<(), Stuck> {
     let n = plant.layout().states.len();
     let mut noise = vec![S::from(0.0); n];
     plant.diffusion(&mut noise);
@@ -121,50 +100,71 @@ pub(super) fn advance<O: Order, S: Scalar>(plant: &dyn Plant<S>, carry: &mut [S]
     })
 }
 
-/// The [`Predictor`](super::Predictor) of an [`Order`].
-macro_rules! filter {
-    ($order:ident, $description:literal) => {
-        impl $crate::predict::Predictor for $order {
-            fn carry(&self, layout: &$crate::layout::Layout) -> usize {
-                $crate::predict::gaussian::carry(layout)
-            }
+/// A filter of some order.
+pub trait Filter: Debug + Clone + Send + Sync + 'static {
+    /// Its order.
+    type Order: Order;
 
-            fn predicts_variance(&self) -> bool {
-                true
-            }
+    /// How it begins.
+    fn initial(&self) -> InitialCovariance {
+        InitialCovariance::Declared
+    }
 
-            fn needs_slopes(&self) -> bool {
-                true
-            }
-
-            fn check(&self, layout: &$crate::layout::Layout) -> Result<(), $crate::error::Error> {
-                $crate::predict::gaussian::check(layout)
-            }
-
-            fn start<S: Scalar>(&self, plant: &dyn Plant<S>, carry: &mut [S]) {
-                $crate::predict::gaussian::start(plant, carry);
-            }
-
-            fn predict<S: Scalar>(&self, plant: &dyn Plant<S>, carry: &[S], output: usize) -> (S, S) {
-                $crate::predict::gaussian::predict::<Self, S>(plant, carry, output)
-            }
-
-            fn correct<S: Scalar>(&self, plant: &dyn Plant<S>, carry: &mut [S], output: usize, error: S) {
-                $crate::predict::gaussian::correct::<Self, S>(plant, carry, output, error);
-            }
-
-            fn advance<S: Scalar>(
-                &self,
-                plant: &dyn Plant<S>,
-                carry: &mut [S],
-            ) -> Result<(), $crate::integrate::Stuck> {
-                $crate::predict::gaussian::advance::<Self, S>(plant, carry)
-            }
-
-            fn describe(&self) -> String {
-                $description.to_owned()
-            }
-        }
-    };
+    /// What it is called.
+    fn name(&self) -> &'static str;
 }
-pub(super) use filter;
+
+impl<F: Filter> Predictor for F {
+    /// The state and its covariance.
+    fn carry(&self, layout: &Layout) -> usize {
+        let n = layout.states.len();
+        n + n * (n + 1) / 2
+    }
+
+    fn predicts_variance(&self) -> bool {
+        true
+    }
+
+    fn needs_slopes(&self) -> bool {
+        true
+    }
+
+    fn check(&self, layout: &Layout) -> Result<(), Error> {
+        match layout.kind {
+            Kind::Static => {
+                Err(Error::Option("a static model has no state to filter; leave the predictor out".to_owned()))
+            }
+            Kind::Continuous | Kind::Discrete => Ok(()),
+        }
+    }
+
+    fn starts_from(&self) -> StartsFrom {
+        match self.initial() {
+            InitialCovariance::Declared => StartsFrom::InitialNoise,
+            InitialCovariance::Stationary | InitialCovariance::FirstInterval => StartsFrom::Slopes,
+        }
+    }
+
+    fn start<S: Scalar>(&self, plant: &dyn Plant<S>, carry: &mut [S]) -> Result<(), Unstable> {
+        let (x, covariance) = carry.split_at_mut(plant.layout().states.len());
+        covariance.copy_from_slice(&self.initial().at(plant, x)?);
+        Ok(())
+    }
+
+    fn predict<S: Scalar>(&self, plant: &dyn Plant<S>, carry: &[S], output: usize) -> (S, S) {
+        let Expected { mean, variance, .. } = expected::<F::Order, S>(plant, carry, output);
+        (mean, variance)
+    }
+
+    fn correct<S: Scalar>(&self, plant: &dyn Plant<S>, carry: &mut [S], output: usize, error: S) {
+        correct::<F::Order, S>(plant, carry, output, error);
+    }
+
+    fn advance<S: Scalar>(&self, plant: &dyn Plant<S>, carry: &mut [S]) -> Result<(), Stuck> {
+        advance::<F::Order, S>(plant, carry)
+    }
+
+    fn describe(&self) -> String {
+        format!("{}{}", self.name(), self.initial().describe())
+    }
+}

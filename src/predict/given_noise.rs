@@ -1,7 +1,6 @@
 //! [`GivenNoise`]: the extended filter with levels of noise that are not the model's.
 
-use super::gaussian;
-use super::{Plant, Predictor, mean};
+use super::{Kalman, Plant, Predictor, Unstable, mean};
 use crate::error::Error;
 use crate::integrate::Stuck;
 use crate::layout::{Kind, Layout};
@@ -103,7 +102,7 @@ impl Predictor for GivenNoise {
     }
 
     fn check(&self, layout: &Layout) -> Result<(), Error> {
-        gaussian::check(layout)?;
+        Kalman.check(layout)?;
         for (what, given, quantities) in
             [("states", &self.states, &layout.states), ("outputs", &self.outputs, &layout.outputs)]
         {
@@ -121,8 +120,10 @@ impl Predictor for GivenNoise {
         Ok(())
     }
 
-    fn start<S: Scalar>(&self, plant: &dyn Plant<S>, carry: &mut [S]) {
-        gaussian::start(plant, carry);
+    /// The state is what the fit takes it to be.
+    fn start<S: Scalar>(&self, plant: &dyn Plant<S>, carry: &mut [S]) -> Result<(), Unstable> {
+        carry[plant.layout().states.len()..].fill(S::from(0.0));
+        Ok(())
     }
 
     fn predict<S: Scalar>(&self, plant: &dyn Plant<S>, carry: &[S], output: usize) -> (S, S) {

@@ -1,6 +1,6 @@
 //! [`Kalman`]: one-step prediction of a plant with process noise.
 
-use super::gaussian::{Order, filter};
+use super::gaussian::{Filter, Order};
 use super::{Moments, Plant};
 use crate::scalar::Scalar;
 use serde::{Deserialize, Serialize};
@@ -26,8 +26,9 @@ use serde::{Deserialize, Serialize};
 ///
 /// The noise is part of the model, [`Model::diffusion`](crate::Model::diffusion) and
 /// [`Model::noise`](crate::Model::noise), so that noise levels are parameters like others. The state at the first
-/// sample is what the fit takes it to be; its covariance is zero, because the fit estimates it or is given it. Without diffusion the
-/// filter predicts what a simulation does.
+/// sample is what the fit takes it to be; its covariance is zero unless the model says otherwise
+/// ([`Model::initial_noise`](crate::Model::initial_noise)), because the fit estimates it or is given it, or what [`Kalman::starting`] asks for.
+/// Without diffusion and initial noise the filter predicts what a simulation does.
 ///
 /// The outputs of a sample are taken in one by one, which for independent measurement noises is the same as all at
 /// once. The covariance is corrected in Joseph's form (R. S. Bucy, P. D. Joseph, *Filtering for Stochastic Processes with Applications to
@@ -39,7 +40,13 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Kalman;
 
-filter!(Kalman, "one-step prediction by a Kalman filter");
+impl Filter for Kalman {
+    type Order = Self;
+
+    fn name(&self) -> &'static str {
+        "one-step prediction by a Kalman filter"
+    }
+}
 
 impl Order for Kalman {
     fn state<S: Scalar>(plant: &dyn Plant<S>, position: f64, carry: &[S]) -> Moments<S> {

@@ -45,6 +45,9 @@ pub trait Plant<S> {
     /// Those of the outputs at the sample.
     fn output_moments(&self, carry: &[S]) -> Moments<S>;
 
+    /// How long the interval is (s).
+    fn length(&self) -> S;
+
     /// Integrates any vector to the next sample by the integrator of the fit: `rate(position, z, to)` writes `dz/dt`
     /// (per second) at a fraction of the interval.
     ///
@@ -57,6 +60,9 @@ pub trait Plant<S> {
 
     /// Measurement noise of each output, as [`Model::noise`](crate::Model::noise).
     fn noise(&self, to: &mut [S]);
+
+    /// Standard deviation of each state at the first sample, as [`Model::initial_noise`](crate::Model::initial_noise).
+    fn initial_noise(&self, to: &mut [S]);
 }
 
 /// From one sample of a record to the next.
@@ -91,6 +97,11 @@ impl<S: Scalar> Between<S> {
         let moves = !record.holds.all_zero() && !last;
         let u1 = moves.then(|| u0.iter().enumerate().map(at_end).collect());
         Between { interval, u0: u0.into_iter().map(S::from).collect(), u1, parts: vec![], part }
+    }
+
+    /// How long it is (s).
+    pub fn length(&self) -> f64 {
+        self.interval.1
     }
 
     fn crossed(&self) -> Option<&Part<S>> {
@@ -236,6 +247,10 @@ impl<S: Stepped> Plant<S> for SlicePlant<'_, S> {
         self.functions.output_moments(t, carry, &u, self.p, self.layout)
     }
 
+    fn length(&self) -> S {
+        S::from(self.between.length())
+    }
+
     fn integrate(&self, z: &mut [S], rate: Rate<'_, S>) -> Result<(), Stuck> {
         // The rate is known in these numbers alone: the Jacobian that an implicit method asks for is by differences.
         let values = |position: f64, z: &[f64]| {
@@ -265,6 +280,10 @@ impl<S: Stepped> Plant<S> for SlicePlant<'_, S> {
 
     fn noise(&self, to: &mut [S]) {
         self.functions.noise(self.p, to);
+    }
+
+    fn initial_noise(&self, to: &mut [S]) {
+        self.functions.initial_noise(self.p, to);
     }
 }
 

@@ -1,6 +1,6 @@
 //! [`SecondOrder`]: a filter for plants that are curved within a standard deviation of their state.
 
-use super::gaussian::{Order, filter};
+use super::gaussian::{Filter, Order};
 use super::{Moments, Plant};
 use crate::scalar::Scalar;
 use serde::{Deserialize, Serialize};
@@ -20,7 +20,13 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SecondOrder;
 
-filter!(SecondOrder, "one-step prediction by a Gaussian filter of second order");
+impl Filter for SecondOrder {
+    type Order = Self;
+
+    fn name(&self) -> &'static str {
+        "one-step prediction by a Gaussian filter of second order"
+    }
+}
 
 impl Order for SecondOrder {
     fn state<S: Scalar>(plant: &dyn Plant<S>, position: f64, carry: &[S]) -> Moments<S> {

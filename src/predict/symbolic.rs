@@ -1,9 +1,9 @@
 //! A predictor and the equations that it predicts, traced as one graph.
 
-use super::{Moments, Plant, Prediction};
+use super::{Moments, Plant, Prediction, StartsFrom};
 use crate::equations::{Equations, Jacobian, MomentsOf, Slopes};
 use crate::functions::Functions;
-use crate::graph::{Graph, Leaf, Symbol, Untraceable};
+use crate::graph::{Graph, Id, Leaf, Node, Symbol, Untraceable};
 use crate::integrate::{Method, Stuck};
 use crate::layout::{Kind, Layout};
 use crate::record::Holds;
@@ -56,7 +56,34 @@ pub(crate) fn recurrence(
     })?;
     let (next, rest) = roots.split_at(carried.min(roots.len()));
     let (mean, variance) = rest.split_at(outputs.min(rest.len()));
-    Recurrence::from_roots(&graph, next, mean, variance).map_err(|wrong| Untraceable { reason: wrong.to_string() })
+    let made = Recurrence::from_roots(&graph, next, mean, variance);
+    let made = made.map_err(|wrong| Untraceable { reason: wrong.to_string() })?;
+    Ok(made.started(layout.states.len(), start_leaves(equations, slopes.as_ref(), predictor)))
+}
+
+/// The states and parameters on which a predictor's start depends.
+fn start_leaves(equations: &Equations, slopes: Option<&Slopes>, predictor: &dyn Prediction) -> Vec<Leaf> {
+    let (layout, roots) = (equations.layout(), equations.roots());
+    let number = |i: usize| u32::try_from(i).unwrap_or(u32::MAX);
+    let states = (0..layout.states.len()).map(|i| Leaf::State(number(i)));
+    let all: Vec<Leaf> = states.chain((0..layout.parameters.len()).map(|j| Leaf::Parameter(number(j)))).collect();
+    let of = |graph: &Graph, roots: &[Id]| -> Vec<Leaf> {
+        let nodes = graph.nodes().iter().zip(graph.reached(roots));
+        let leaf = |(node, reached): (&Node, bool)| match node {
+            Node::Leaf(leaf) if reached && all.contains(leaf) => Some(*leaf),
+            _ => None,
+        };
+        nodes.filter_map(leaf).collect()
+    };
+    match (predictor.starts_from(), slopes) {
+        (StartsFrom::InitialNoise, _) => of(equations.graph(), &roots.initial_noise),
+        (StartsFrom::Slopes, Some(Slopes { state, .. })) => {
+            // Inputs may be late.
+            let levels = of(equations.graph(), &[&*roots.diffusion, &roots.delay].concat());
+            [levels, of(&state.graph, &state.entries)].concat()
+        }
+        _ => all,
+    }
 }
 
 /// A plant in symbols.
@@ -126,6 +153,10 @@ impl Plant<Symbol> for SymbolicPlant<'_> {
         self.moments(&self.equations_moments().1, 0.0, carry)
     }
 
+    fn length(&self) -> Symbol {
+        Symbol::leaf(Leaf::Step)
+    }
+
     fn integrate(&self, z: &mut [Symbol], rate: &dyn Fn(f64, &[Symbol], &mut [Symbol])) -> Result<(), Stuck> {
         self.interval.cross(Kind::Continuous, z, rate);
         Ok(())
@@ -137,5 +168,9 @@ impl Plant<Symbol> for SymbolicPlant<'_> {
 
     fn noise(&self, to: &mut [Symbol]) {
         self.interval.equations().noise(&self.p, to);
+    }
+
+    fn initial_noise(&self, to: &mut [Symbol]) {
+        self.interval.equations().initial_noise(&self.p, to);
     }
 }

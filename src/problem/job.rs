@@ -27,8 +27,12 @@ impl Objective<'_> {
                 *scale = 0.0;
             }
         }
-        let Reached { carry, slopes: all } = self.sweep.start(record, &values.x, &values.p);
         let (states, width) = (values.x.len(), values.x.len() + values.p.len());
+        // What has no start cannot be evaluated: its first error is not a number.
+        let size = self.sweep.carry();
+        let none = |_| Reached { carry: vec![f64::NAN; size], slopes: vec![f64::NAN; size * width] };
+        let started = self.sweep.start(record, &values.x, &values.p);
+        let Reached { carry, slopes: all } = started.unwrap_or_else(none);
         let column = |seed: &Seed| match *seed {
             Seed::Carry(i) => i,
             Seed::Parameter(j) => states + j,

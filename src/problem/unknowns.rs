@@ -5,11 +5,11 @@
 
 use crate::error::Error;
 use crate::information::Information;
-use crate::layout::{Layout, Quantity};
+use crate::layout::{Kind, Layout, Quantity};
 use crate::numeral::exact;
 use crate::parameter::{Parameter, Transform, fixed, free};
 use crate::record::{Initial, Record};
-use crate::sweep::{Guess, Seed, Sweep};
+use crate::sweep::{Guess, Seed, Sweep, Unstable};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
@@ -127,6 +127,26 @@ impl Unknowns {
     /// The coordinates where the search starts.
     pub fn start(&self) -> Vec<f64> {
         self.row.iter().map(|u| u.parameter.transform.to_coordinate(u.parameter.start)).collect()
+    }
+
+    /// Whether the predictor can start where the search does.
+    pub fn check_starts(&self, sweep: &dyn Sweep, records: &[Record]) -> Result<(), Error> {
+        let (start, layout) = (self.start(), sweep.layout());
+        for (e, record) in records.iter().enumerate() {
+            let Values { x, p } = self.of_experiment(e, &start);
+            sweep.start(record, &x, &p).map_err(|unstable| self.not_stationary(layout, e, unstable))?;
+        }
+        Ok(())
+    }
+
+    /// The error of an experiment whose plant is unstable where the predictor needs one that is not.
+    pub fn not_stationary(&self, layout: &Layout, e: usize, Unstable { state, rate }: Unstable) -> Error {
+        Error::NotStationary {
+            experiment: self.labels[e].clone(),
+            state: layout.states.get(state).map_or_else(String::new, |state| state.name.clone()),
+            rate,
+            per: if layout.kind == Kind::Discrete { "sample" } else { "s" },
+        }
     }
 
     /// The bounds of each coordinate.

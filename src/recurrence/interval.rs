@@ -75,13 +75,13 @@ impl<'a> SymbolicInterval<'a> {
 
     /// `dx/dt`, or the next state of discrete equations.
     pub fn rate(&self, position: f64, x: &[Symbol], to: &mut [Symbol]) {
-        let found = self.at(self.equations.graph(), self.equations.state(), position, x);
+        let found = self.at(self.equations.graph(), &self.equations.roots().state, position, x);
         to.iter_mut().zip(found).for_each(|(to, found)| *to = found);
     }
 
     /// The outputs at the sample.
     pub fn output(&self, x: &[Symbol]) -> Vec<Symbol> {
-        self.at(self.equations.graph(), self.equations.output(), 0.0, x)
+        self.at(self.equations.graph(), &self.equations.roots().output, 0.0, x)
     }
 
     /// The state at the next sample.

@@ -70,6 +70,7 @@ mod tests {
         }
         fn diffusion(&self, _p: &[f64], _to: &mut [f64]) {}
         fn noise(&self, _p: &[f64], _to: &mut [f64]) {}
+        fn initial_noise(&self, _p: &[f64], _to: &mut [f64]) {}
         fn delay(&self, _p: &[f64], _to: &mut [f64]) {}
     }
 

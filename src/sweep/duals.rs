@@ -3,13 +3,13 @@
 use super::affine::not_affine;
 use super::failure::FailureSearch;
 use super::filtered::Filter;
-use super::{ModelCode, Piece, Prepared, Reached, RunError, Seed, Sweep, Visit, unmoved};
+use super::{ModelCode, Piece, Prepared, Reached, RunError, Seed, States, Sweep, Visit, unmoved};
 use crate::error::{Error, Failure};
 use crate::functions::delays;
 use crate::graph::Choices;
 use crate::integrate::Method;
 use crate::layout::{Kind, Layout};
-use crate::predict::{FreeRun, Guess, Place, Prediction};
+use crate::predict::{FreeRun, Guess, Place, Prediction, Unstable};
 use crate::record::{Channel, Record};
 use std::sync::Arc;
 
@@ -97,9 +97,9 @@ impl Sweep for DualSweep<'_> {
         Ok(Prepared { restarts, ..Prepared::default() })
     }
 
-    fn start(&self, record: &Record, state: &[f64], parameters: &[f64]) -> Reached {
+    fn start(&self, record: &Record, state: &[f64], parameters: &[f64]) -> Result<Reached, Unstable> {
         match self.predictor.is_simulation() {
-            true => unmoved(state, parameters),
+            true => Ok(unmoved(state, parameters)),
             false => self.filter(parameters).start(record, state, parameters),
         }
     }
@@ -114,6 +114,17 @@ impl Sweep for DualSweep<'_> {
             }
         };
         pieces.iter().map(one).collect()
+    }
+
+    fn states(
+        &self,
+        record: &Record,
+        carry: &[f64],
+        parameters: &[f64],
+        smoothed: bool,
+    ) -> Option<Result<States, usize>> {
+        let is_kalman = self.predictor.second_order().is_some();
+        is_kalman.then(|| self.filter(parameters).states(record, carry, parameters, smoothed))
     }
 
     fn measured_state(&self, record: &Record, sample: usize, p: &[f64]) -> Result<Vec<f64>, String> {

@@ -159,6 +159,10 @@ impl Functions<f64> for Watched<'_> {
         self.values.noise(p, to);
     }
 
+    fn initial_noise(&self, p: &[f64], to: &mut [f64]) {
+        self.values.initial_noise(p, to);
+    }
+
     fn delay(&self, p: &[f64], to: &mut [f64]) {
         self.values.delay(p, to);
     }

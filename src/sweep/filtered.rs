@@ -6,7 +6,8 @@ use crate::dual::Dual;
 use crate::functions::{Functions, delays};
 use crate::integrate::{Duals, Method, Stuck};
 use crate::layout::Layout;
-use crate::predict::{Between, Prediction, SlicePlant, Stepped, Steps};
+use crate::predict::{Between, Prediction, SlicePlant, Stepped, Steps, Unstable};
+use crate::record::Record;
 use crate::scalar::Scalar;
 use core::cell::Cell;
 
@@ -15,7 +16,7 @@ const WINDOW: usize = 128;
 /// Samples per window where a single one may take many steps: after each window a fit looks at its time limit.
 const ADAPTIVE_WINDOW: usize = 8;
 /// Slopes of a pass.
-const SLOPES: usize = 8;
+pub(super) const SLOPES: usize = 8;
 /// Slopes below this are set to zero: their squares are denormal.
 const NEGLIGIBLE: f64 = 1e-150;
 
@@ -91,7 +92,12 @@ impl Number for Duals {
 
 impl Filter<'_> {
     /// The carry at the first sample, with slopes with respect to states, then parameters.
-    pub fn start(&self, record: &crate::record::Record, state: &[f64], parameters: &[f64]) -> Reached {
+    ///
+    /// # Errors
+    /// A plant that is unstable where the predictor cannot start from one that is.
+    pub fn start(&self, record: &Record, state: &[f64], parameters: &[f64]) -> Result<Reached, Unstable> {
+        // Of several samples at the first instant the last, from which time passes.
+        let sample = (1..record.len()).take_while(|k| record.time(*k) == record.time(0)).last().unwrap_or(0);
         let (n, width) = (state.len(), state.len() + parameters.len());
         let size = self.predictor.carry(self.layout);
         let mut reached = Reached { carry: vec![0.0; size], slopes: vec![0.0; size * width] };
@@ -103,8 +109,9 @@ impl Filter<'_> {
             }
             let p: Vec<Duals> = parameters.iter().enumerate().map(|(j, p)| Dual::variable(*p, lane(n + j))).collect();
             let step = Cell::new(0.0);
-            let plant = self.plant(self.duals, Between::new(record, 0, &delays(self.duals, &self.late, &p)), &p, &step);
-            self.predictor.duals().start(&plant, &mut carry);
+            let plant =
+                self.plant(self.duals, Between::new(record, sample, &delays(self.duals, &self.late, &p)), &p, &step);
+            self.predictor.duals().start(&plant, &mut carry)?;
             for (entry, x) in carry.iter().enumerate() {
                 reached.carry[entry] = x.value;
                 for i in 0..SLOPES.min(width - first.min(width)) {
@@ -112,7 +119,7 @@ impl Filter<'_> {
                 }
             }
         }
-        reached
+        Ok(reached)
     }
 
     /// Runs a piece. With `restart`, samples are predicted from the measured states that many samples before.
@@ -130,7 +137,7 @@ impl Filter<'_> {
         }
     }
 
-    fn plant<'p, S: Stepped>(
+    pub(super) fn plant<'p, S: Stepped>(
         &'p self,
         functions: &'p dyn Functions<S>,
         between: Between<S>,

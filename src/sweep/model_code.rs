@@ -139,6 +139,10 @@ impl<S: Scalar> Functions<S> for Evaluated {
         self.equations.noise(p, to);
     }
 
+    fn initial_noise(&self, p: &[S], to: &mut [S]) {
+        self.equations.initial_noise(p, to);
+    }
+
     fn delay(&self, p: &[S], to: &mut [S]) {
         Functions::delay(&*self.equations, p, to);
     }

@@ -9,7 +9,7 @@ mod run;
 mod workspace;
 
 use super::made::of_equations;
-use super::{Coupling, Piece, Prepared, Reached, RunError, Seed, Sweep, Visit};
+use super::{Coupling, Piece, Prepared, Reached, RunError, Seed, States, Sweep, Visit};
 use crate::engine::{Program, Sampling, Trajectories};
 use crate::equations::Equations;
 use crate::error::{Error, Failure};
@@ -17,7 +17,7 @@ use crate::graph::Untraceable;
 use crate::integrate::Method;
 use crate::interval::Hold;
 use crate::layout::{Kind, Layout};
-use crate::predict::{FreeRun, GivenNoise, Guess, Prediction, recurrence};
+use crate::predict::{FreeRun, GivenNoise, Guess, Prediction, Unstable, recurrence};
 use crate::record::{Holds, Record, Time};
 use crate::recurrence::Recurrence;
 pub(crate) use derived::Derived;
@@ -195,7 +195,7 @@ impl Sweep for ProgramSweep<'_> {
         self.plain.prepare(record, parameters)
     }
 
-    fn start(&self, record: &Record, state: &[f64], parameters: &[f64]) -> Reached {
+    fn start(&self, record: &Record, state: &[f64], parameters: &[f64]) -> Result<Reached, Unstable> {
         self.plain.start(record, state, parameters)
     }
 
@@ -218,6 +218,16 @@ impl Sweep for ProgramSweep<'_> {
             Some(program) => Run::new(&program, vec![piece.clone()]).follow(at),
             None => self.plain.follow(piece, at),
         }
+    }
+
+    fn states(
+        &self,
+        record: &Record,
+        carry: &[f64],
+        parameters: &[f64],
+        smoothed: bool,
+    ) -> Option<Result<States, usize>> {
+        self.plain.states(record, carry, parameters, smoothed)
     }
 
     fn measured_state(&self, record: &Record, sample: usize, p: &[f64]) -> Result<Vec<f64>, String> {

@@ -6,7 +6,7 @@ use super::document::Document;
 use super::expression::{At, Expression, Operation, Relation, Sign};
 use super::names::{Meaning, Names, function, items, names, order};
 use super::remark::{Remark, Source, nearest};
-use crate::equations::Equations;
+use crate::equations::{Equations, Roots};
 use crate::graph::{Function2, Graph, Id, Leaf};
 use crate::layout::{Layout, Quantity};
 use crate::scalar::Comparison;
@@ -22,12 +22,14 @@ pub(super) fn compile(document: &Document, source: &Arc<Source>) -> Result<Equat
     let output = all(document.outputs.iter().map(|one| &one.value).collect(), &mut compiler);
     let diffusion = compiler.levels(document.states.iter().map(|one| one.diffusion.as_ref()), 0.0, "the diffusion");
     let noise = compiler.levels(document.outputs.iter().map(|one| one.noise.as_ref()), f64::NAN, "the noise");
+    let initial = document.states.iter().map(|one| one.initial_noise.as_ref());
+    let initial_noise = compiler.levels(initial, 0.0, "the initial noise");
     let delay = compiler.levels(document.inputs.iter().map(|one| one.delay.as_ref()), 0.0, "the dead time");
     if !compiler.errors.is_empty() {
         return Err(compiler.errors);
     }
-    let roots: [&[Id]; 5] = [&state, &output, &diffusion, &noise, &delay];
-    let made = Equations::complete(layout(document), &compiler.graph, roots);
+    let roots = Roots { state, output, diffusion, noise, initial_noise, delay };
+    let made = Equations::complete(layout(document), &compiler.graph, &roots);
     made.map_err(|wrong| vec![Remark::error(source, 0..0, wrong.to_string())])
 }
 

@@ -70,6 +70,11 @@ pub(super) fn check(document: &Document, source: &Arc<Source>) -> Vec<Remark> {
                     &said("/s^0.5"),
                 );
             }
+            if let Some(initial) = &state.initial_noise {
+                let found = checker.unit(initial);
+                let what = format!("the initial noise of `{name}`");
+                checker.compare(initial, found, unit, &what, &state.quantity.unit);
+            }
         }
     }
     for input in &document.inputs {

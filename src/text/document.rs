@@ -71,6 +71,8 @@ pub(super) struct State {
     pub rate: Expression,
     pub begin: Option<(Begin, Span)>,
     pub diffusion: Option<Expression>,
+    /// Standard deviation at the first sample.
+    pub initial_noise: Option<Expression>,
 }
 
 #[derive(Clone, Debug)]

@@ -32,7 +32,8 @@ impl From<&Model> for Section {
         let delays = document.inputs.iter().map(|one| ("delay", &one.quantity, &one.delay));
         let diffusion = document.states.iter().map(|one| ("diffusion", &one.quantity, &one.diffusion));
         let noise = document.outputs.iter().map(|one| ("noise", &one.quantity, &one.noise));
-        for (what, quantity, expression) in delays.chain(diffusion).chain(noise) {
+        let initial = document.states.iter().map(|one| ("initial noise", &one.quantity, &one.initial_noise));
+        for (what, quantity, expression) in delays.chain(diffusion).chain(noise).chain(initial) {
             if let Some(expression) = expression {
                 rows.push((format!("{what} of {}", quantity.name), model.written(expression)));
             }

@@ -88,6 +88,14 @@ impl Values {
         }
     }
 
+    /// The expression of an entry that may be left out; nothing where it is wrong.
+    pub fn optional(&mut self, entry: Option<&Entry<'_>>) -> Option<Option<Expression>> {
+        match entry {
+            Some(entry) => self.expression(entry).map(Some),
+            None => Some(None),
+        }
+    }
+
     pub fn number(&mut self, entry: &Entry<'_>) -> Option<f64> {
         match number(entry.value) {
             Some(value) => Some(value),

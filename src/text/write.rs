@@ -3,7 +3,7 @@
 use super::lex::is_name;
 use super::read::RESERVED;
 use super::remark::Error;
-use crate::equations::Equations;
+use crate::equations::{Equations, Roots};
 use crate::graph::{Id, Leaf};
 use crate::layout::{Kind, Layout, Quantity};
 use crate::parameter::{Parameter, Transform};
@@ -16,12 +16,12 @@ pub(super) fn file(equations: &Equations, name: &str, parameters: &[Parameter]) 
     let layout = equations.layout();
     check(layout, parameters)?;
     let (shared, table) = (free_word(layout, "_"), free_word(layout, "table"));
-    let [diffusion, noise] = equations.levels();
-    let counts = [equations.state(), equations.output(), diffusion, noise, equations.delay()].map(<[Id]>::len);
+    let Roots { state, output, diffusion, noise, initial_noise, delay } = equations.roots();
+    let counts = [state, output, diffusion, noise, initial_noise, delay].map(Vec::len);
     let lines = lines(equations, [&shared, &table]);
     let (definitions, roots) = lines.split_at(lines.len() - counts.iter().sum::<usize>());
     let mut rest = roots.iter().map(|(_, text)| text.as_str());
-    let [rates, outputs, diffusion, noise, delay] =
+    let [rates, outputs, diffusion, noise, initial_noise, delay] =
         counts.map(|count| rest.by_ref().take(count).collect::<Vec<&str>>());
 
     let mut file = Writer { text: String::from("greybox = 1\n") };
@@ -42,8 +42,10 @@ pub(super) fn file(equations: &Equations, name: &str, parameters: &[Parameter]) 
     file.group("let", definitions.iter().map(|(name, text)| (name.as_str(), quoted(text))));
     let key = if layout.kind == Kind::Discrete { "next" } else { "derivative" };
     let state = |(i, (one, rate)): (usize, (&'_ Quantity, &&str))| {
-        let diffusion = diffusion.get(i).map_or(String::new(), |level| format!(", diffusion = {}", quoted(level)));
-        (one.name.clone(), format!("{{ unit = {}, {key} = {}{diffusion} }}", unit(one), quoted(rate)))
+        let level =
+            |name: &str, of: &[&str]| of.get(i).map_or(String::new(), |level| format!(", {name} = {}", quoted(level)));
+        let levels = level("diffusion", &diffusion) + &level("initial_noise", &initial_noise);
+        (one.name.clone(), format!("{{ unit = {}, {key} = {}{levels} }}", unit(one), quoted(rate)))
     };
     file.group("states", layout.states.iter().zip(&rates).enumerate().map(state));
     let output = |(i, (one, value)): (usize, (&'_ Quantity, &&str))| {
@@ -55,7 +57,7 @@ pub(super) fn file(equations: &Equations, name: &str, parameters: &[Parameter]) 
     Ok(file.text)
 }
 
-/// Definitions, then rates of states, outputs, diffusion, noise and dead times.
+/// Definitions, then the roots in their order.
 fn lines(equations: &Equations, words: [&str; 2]) -> Vec<(String, String)> {
     let layout = equations.layout();
     let name = |leaf: Leaf| match leaf {
@@ -64,9 +66,7 @@ fn lines(equations: &Equations, words: [&str; 2]) -> Vec<(String, String)> {
         Leaf::Parameter(i) => in_expression(&layout.parameters[i as usize].name),
         _ => "t".to_owned(),
     };
-    let [diffusion, noise] = equations.levels();
-    let all = [equations.state(), equations.output(), diffusion, noise, equations.delay()].concat();
-    let roots: Vec<(String, Id)> = all.into_iter().map(|id| (String::new(), id)).collect();
+    let roots: Vec<(String, Id)> = equations.roots().all().into_iter().map(|id| (String::new(), id)).collect();
     equations.graph().lines(&name, words, &roots)
 }
 

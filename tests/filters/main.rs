@@ -7,4 +7,8 @@ mod extended;
 mod given_noise;
 #[path = "../common/hardening.rs"]
 mod hardening;
+mod initial;
 mod second_order;
+mod simulated;
+mod smoothed;
+mod walls;

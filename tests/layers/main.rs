@@ -15,7 +15,7 @@ const LAYERS: &[(&str, &[&str])] = &[
     ("vector registers", &["aligned", "lanes", "wide"]),
     ("numbers", &["scalar", "units", "random", "numeral", "whiteness", "real", "format"]),
     ("numbers: with slopes, in vectors", &["dual", "fused", "signals"]),
-    ("numbers: graphs, triangles", &["information", "error", "by_name", "layout", "graph", "moments"]),
+    ("numbers: graphs, triangles", &["information", "error", "by_name", "layout", "graph", "moments", "transition"]),
     ("declarations", &["model", "parameter", "scaling", "interval"]),
     ("data: records and functions by position", &["record", "functions"]),
     ("data: equations as graphs", &["equations"]),

@@ -55,13 +55,14 @@ fn a_motor() {
 fn a_section_has_dead_times_and_noise() {
     let text = PMSM.replace("ke = {", "late = { unit = \"s\", start = 1e-3 }\nke = {");
     let text = text.replace("hold = \"zero\" }", "hold = \"zero\", delay = \"2*late\" }");
-    let text = text.replacen("initial = \"first\" }", "initial = \"first\", diffusion = 0.25 }", 1);
+    let text =
+        text.replacen("initial = \"first\" }", "initial = \"first\", diffusion = 0.25, initial_noise = 0.5 }", 1);
     let table = greybox::report::Section::from(&model(&text)).tables[0].to_string();
     let rows: Vec<Vec<&str>> = table.lines().map(|line| line.split_whitespace().collect()).collect();
-    for row in ["delay of ud 2*late", "diffusion of id 0.25", "noise of iq 0.05"] {
+    for row in ["delay of ud 2*late", "diffusion of id 0.25", "noise of iq 0.05", "initial noise of id 0.5"] {
         assert!(rows.iter().any(|cells| cells.join(" ") == row), "{row} in\n{table}");
     }
-    assert!(!table.contains("noise of id"), "{table}");
+    assert!(!table.lines().any(|line| line.starts_with("noise of id")), "{table}");
 }
 
 /// The value of an expression of `x` (0.7), `y` (-1.3), `p` (2) and the time (3).
@@ -73,7 +74,7 @@ fn value(expression: &str) -> f64 {
          [let]\nlater = \"2*sooner\"\nsooner = \"x + 1\"\n[outputs]\nvalue = '''{expression}'''"
     );
     let equations = model(&text).equations().clone();
-    equations.graph().evaluate::<f64>(equations.output(), |leaf| match leaf {
+    equations.graph().evaluate::<f64>(&equations.roots().output, |leaf| match leaf {
         Leaf::Input(0) => 0.7,
         Leaf::Input(_) => -1.3,
         Leaf::Parameter(_) => 2.0,
@@ -118,13 +119,26 @@ fn kinds_and_what_is_declared() {
     let discrete = model(
         "greybox = 1\noutputs = [\"x\"]\n[parameters]\na = { start = 0.5, log = true, prior = { mean = 0.4, sd = 0.1 } }\n\
          b = { fixed = 2 }\nq = { start = 0.1, per_experiment = true }\n[inputs]\nu = { unit = \"V\", hold = \"linear\" }\n\
-         [states]\nx = { next = \"a*x + b*u\", initial = 0.3, diffusion = \"q\" }\nz = { next = \"z\", initial = { start = 1, within = [0, 2] } }",
+         [states]\nx = { next = \"a*x + b*u\", initial = 0.3, diffusion = \"q\", initial_noise = \"2*q\" }\nz = { next = \"z\", initial = { start = 1, within = [0, 2] } }",
     );
     assert_eq!(discrete.equations().layout().kind, Kind::Discrete);
     assert_eq!(discrete.parameters(), [free(0.5).log().prior(0.4, 0.1), fixed(2.0), free(0.1).per_experiment()]);
     assert_eq!(discrete.initial(), Initial::Given(vec![fixed(0.3), free(1.0).within(0.0, 2.0)]));
     assert_eq!((discrete.holds(), discrete.noise()), (vec![Some(Hold::First)], vec![None]));
-    assert_eq!(discrete.equations().levels()[0].len(), 2);
+    let equations = discrete.equations();
+    assert_eq!([equations.roots().diffusion.len(), equations.roots().initial_noise.len()], [2, 2]);
+    let levels = |of: &Model| {
+        let roots = [&*of.equations().roots().diffusion, &of.equations().roots().initial_noise].concat();
+        of.equations().graph().evaluate(&roots, |_| 0.7f64)
+    };
+    assert_eq!(levels(&discrete), [0.7, 0.0, 1.4, 0.0]);
+    // As a file of its equations, and as Rust.
+    assert_eq!(levels(&Model::of(equations, "model", discrete.parameters()).unwrap()), [0.7, 0.0, 1.4, 0.0]);
+    let json = serde_json::to_string(&**equations).unwrap();
+    assert_eq!(serde_json::from_str::<greybox::equations::Equations>(&json).unwrap(), **equations);
+    let code = discrete.to_rust().unwrap();
+    let function = code.split("fn initial_noise").nth(1).unwrap();
+    assert!(function.contains("x: p.q * 2.0,") && function.contains("z: S::from(0.0),"), "{function}");
     let fixed_output =
         model("greybox = 1\n[inputs]\nu = \"V\"\n[outputs]\ny = { value = \"2*u\", unit = \"V\", noise = 0.1 }");
     assert_eq!(fixed_output.equations().layout().kind, Kind::Static);

@@ -53,7 +53,7 @@ fn twin(name: &str) -> Equations {
 
 /// States' equations and outputs where each quantity is a number of its own.
 pub fn values(equations: &Equations, seed: u64) -> Vec<f64> {
-    let roots = [equations.state(), equations.output()].concat();
+    let roots = [&*equations.roots().state, &equations.roots().output].concat();
     let number = |group: u64, i: u32| {
         let mix = (seed * 64 + group * 16 + u64::from(i) + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
         0.2 + (mix >> 11) as f64 / (1u64 << 53) as f64

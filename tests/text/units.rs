@@ -18,6 +18,8 @@ fn sums_of_other_dimensions() {
     assert_eq!(warnings("(ud - rs*id)/ls + we*iq", "ud - rs*id"), whole);
     assert_eq!(warnings("(ud - rs*id)", "(if w > ud then ud else uq)"), ["`w` is in 1/s, `ud` is in V"]);
     assert_eq!(warnings("we*iq", "we*iq*exp(ud)"), ["`exp` takes a number without a unit, this is in V"]);
+    let noise = ["the initial noise of `id` is in A, this is in ohm"];
+    assert_eq!(warnings("initial = \"first\" }", "initial = \"first\", initial_noise = \"rs\" }"), noise);
     // Numbers fit any unit, and a factor may convert.
     assert!(warnings("ud - rs*id)", "ud + 1 - 2*rs*id)").is_empty());
     assert!(warnings("ud - rs*id)", "max(ud, 0) - hypot(rs*id, 1e-3) + sqrt(uq^2))").is_empty());

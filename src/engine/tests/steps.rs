@@ -42,7 +42,7 @@ impl Model for Pmsm {
 /// The simulation of equations by a method of fixed steps: the state is carried.
 pub fn simulation(equations: &Equations, integrator: &impl Integrator, hold: Hold) -> Recurrence {
     let mut graph = Graph::default();
-    let mean = graph.import(equations.graph(), equations.output(), Graph::leaf);
+    let mean = graph.import(equations.graph(), &equations.roots().output, Graph::leaf);
     let states = equations.layout().states.len() as u32;
     let holds = Holds::All(hold);
     let between = SymbolicInterval::new(equations, integrator, &holds);

@@ -5,7 +5,7 @@ use crate::functions::Handle;
 use crate::graph::choices;
 use crate::integrate::{Rk4, automatic};
 use crate::model::Model;
-use crate::predict::{FreeRun, Horizon, Kalman, Predictor};
+use crate::predict::{FreeRun, Horizon, InitialCovariance, Kalman, Predictor};
 use crate::record::{Channel, Column};
 use crate::scalar::Scalar;
 use crate::signals;
@@ -119,7 +119,13 @@ fn compare(model: &Pendulum, predictor: impl Predictor, uniform: bool, hold: Hol
         [vec![], vec![Seed::Carry(1), Seed::Parameter(0), Seed::Parameter(2), Seed::Parameter(3), Seed::Parameter(4)]]
     {
         let piece = |i: usize| {
-            let Reached { carry, slopes: all } = plain.start(&records[i], &[0.3, -0.2], &all_p[i]);
+            let start = |sweep: &dyn Sweep| sweep.start(&records[i], &[0.3, -0.2], &all_p[i]).unwrap();
+            let Reached { carry, slopes: all } = start(&*plain);
+            for other in [start(&*evaluated), start(&*programs)] {
+                let pairs = carry.iter().zip(&other.carry).chain(all.iter().zip(&other.slopes));
+                // Some dozens of roundings.
+                pairs.for_each(|(a, b)| assert!((a - b).abs() < 1e-12, "start of record {i}: {a} {b}"));
+            }
             let column = |seed: &Seed| match *seed {
                 Seed::Carry(i) => i,
                 Seed::Parameter(j) => 2 + j,
@@ -163,6 +169,10 @@ fn programs_predict_what_duals_predict() {
             compare(&Pendulum { linear: false }, FreeRun, uniform, hold);
             compare(&Pendulum { linear: true }, Kalman, uniform, hold);
             compare(&Pendulum { linear: false }, Kalman, uniform, hold);
+            for initial in [InitialCovariance::Stationary, InitialCovariance::FirstInterval] {
+                compare(&Pendulum { linear: true }, Kalman::starting(initial), uniform, hold);
+                compare(&Pendulum { linear: false }, Kalman::starting(initial), uniform, hold);
+            }
         }
         compare(&Pendulum { linear: false }, Horizon::new(1), true, hold);
         compare(&Pendulum { linear: false }, Horizon::new(35), true, hold);

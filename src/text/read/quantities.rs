@@ -42,10 +42,7 @@ impl Reader {
                 }
             },
         };
-        let delay = match field(&fields, "delay") {
-            Some(found) => Some(self.values.expression(found)?),
-            None => None,
-        };
+        let delay = self.values.optional(field(&fields, "delay"))?;
         Some(Input { quantity, hold, delay })
     }
 
@@ -63,7 +60,8 @@ impl Reader {
 
     pub(super) fn state(&mut self, entry: &Entry<'_>, kind: Kind) -> Option<State> {
         let (key, other) = if kind == Kind::Discrete { ("next", "derivative") } else { ("derivative", "next") };
-        let (quantity, fields) = self.in_table(entry, "a state", &["derivative", "next", "initial", "diffusion"])?;
+        let (quantity, fields) =
+            self.in_table(entry, "a state", &["derivative", "next", "initial", "diffusion", "initial_noise"])?;
         if let Some(found) = field(&fields, other) {
             let title = format!("state `{}` has `{other}`, another has `{key}`", entry.key);
             let remark = Remark::error(&self.values.source, found.at.clone(), title);
@@ -75,12 +73,11 @@ impl Reader {
             Some(found) => Some((self.begin(found)?, found.span.clone())),
             None => None,
         };
-        let diffusion = match field(&fields, "diffusion") {
-            Some(found) => Some(self.values.expression(found)?),
-            None => None,
-        };
+        let [diffusion, initial_noise] = ["diffusion", "initial_noise"].map(|key| field(&fields, key));
+        let diffusion = self.values.optional(diffusion)?;
+        let initial_noise = self.values.optional(initial_noise)?;
         let rate = self.required(entry, &fields, key, "state")?;
-        Some(State { quantity, rate, begin, diffusion })
+        Some(State { quantity, rate, begin, diffusion, initial_noise })
     }
 
     /// `outputs = ["id", "iq"]` of states or inputs, or a table.
@@ -129,10 +126,7 @@ impl Reader {
             DeValue::Table(_) => {
                 let (quantity, fields) = self.in_table(entry, "an output", &["value", "noise"])?;
                 let value = self.required(entry, &fields, "value", "output")?;
-                let noise = match field(&fields, "noise") {
-                    Some(found) => Some(self.values.expression(found)?),
-                    None => None,
-                };
+                let noise = self.values.optional(field(&fields, "noise"))?;
                 Some(Output { quantity, value, noise })
             }
             _ => {

@@ -71,7 +71,7 @@ fn compare(model: &impl Model, predictor: impl Predictor, holds: [Hold; 3], late
     for (begin, seeds) in [(0, &SEEDS[..]), (0, &[]), (70, &SEEDS[..])] {
         let prepared: Vec<Prepared> = all_p.iter().map(|p| plain.prepare(&record, p).unwrap()).collect();
         let piece = |(parameters, prepared)| {
-            let Reached { carry, slopes } = plain.start(&record, &[0.3, -0.2], parameters);
+            let Reached { carry, slopes } = plain.start(&record, &[0.3, -0.2], parameters).unwrap();
             let column = |seed: &Seed| match *seed {
                 Seed::Carry(i) => i,
                 Seed::Parameter(j) => 2 + j,

@@ -1,0 +1,66 @@
+//! What process noise adds to a simulated state from one sample to the next.
+
+use crate::integrate::{ModelSystem, Square, System};
+use crate::layout::Kind;
+use crate::model::Model;
+use crate::random::Random;
+use crate::signals::{Of, Signals};
+use crate::transition::Transition;
+
+/// The random numbers of states are others than those that [`with_noise`](super::Simulation::with_noise) adds to outputs.
+const STATES: u64 = 1 << 32;
+
+/// Draws of a model's process noise: the same seed draws the same.
+pub(super) struct Disturbance {
+    of_states: Vec<Random>,
+}
+
+impl Disturbance {
+    pub fn new(states: usize, seed: u64) -> Self {
+        Disturbance { of_states: (0..states as u64).map(|i| Random::stream(seed, STATES + i)).collect() }
+    }
+
+    /// The state at the end of an interval of `h` (s) that begins at another, disturbed by a normal number with the covariance that the
+    /// diffusion leaves over it.
+    pub fn add<M: Model>(
+        &mut self,
+        system: &ModelSystem<'_, M, f64>,
+        begin: &Of<M::State, f64>,
+        h: f64,
+        end: &Of<M::State, f64>,
+    ) -> Of<M::State, f64> {
+        let end = M::State::into_array(*end);
+        let end = end.as_ref();
+        let n = M::State::LEN;
+        let levels = M::State::into_array(system.model.diffusion(system.p));
+        let levels = levels.as_ref();
+        let normal: Vec<f64> = self.of_states.iter_mut().map(Random::normal).collect();
+        if M::KIND != Kind::Continuous {
+            return M::State::from_fn(|i| end[i] + levels[i] * normal[i]);
+        }
+        let rows = system.jacobian(0.0, &M::State::into_array(*begin)).1;
+        let a: Vec<f64> = (0..n).flat_map(|i| rows.row(i).to_vec()).collect();
+        let mut q = vec![0.0; n * n];
+        q.iter_mut().step_by(n + 1).zip(levels).for_each(|(q, level)| *q = level * level);
+        let factor = factor(n, Transition::over(n, &a, &q, h).covariance());
+        M::State::from_fn(|i| end[i] + (0..=i).map(|j| factor[i * n + j] * normal[j]).sum::<f64>())
+    }
+}
+
+/// The lower triangle whose product with its mirror image is a covariance, by A.-L. Cholesky's method; a column of zeros where a state has no
+/// noise but that of the states before it.
+fn factor(n: usize, covariance: Vec<f64>) -> Vec<f64> {
+    let mut factor = covariance;
+    for j in 0..n {
+        let own = factor[j * n + j];
+        let rest = own - (0..j).map(|k| factor[j * n + k] * factor[j * n + k]).sum::<f64>();
+        // What is left of rounding is none.
+        let root = if rest > 1e-14 * own { rest.sqrt() } else { 0.0 };
+        factor[j * n + j] = root;
+        for i in j + 1..n {
+            let shared = (0..j).map(|k| factor[i * n + k] * factor[j * n + k]).sum::<f64>();
+            factor[i * n + j] = if root > 0.0 { (factor[i * n + j] - shared) / root } else { 0.0 };
+        }
+    }
+    factor
+}
