@@ -241,7 +241,7 @@ impl<'a, M: Made> Fit<'a, M> {
     /// on the parameters, where a simulation would leave the measurements, diverge, or end in one of many minima.
     ///
     /// Without it, a fit does so by itself where the declared start cannot be simulated, or where the search from there leaves an output
-    /// unexplained; after `starts(1)` it does not. A start from which a stage fails stays as it is. Stages need a model that can be read as a graph,
+    /// unexplained; after `starts(1)` it does not. After `staged()` it searches from no 32 starts. A start from which a stage fails stays as it is. Stages need a model that can be read as a graph,
     /// of at most six states, and no pre-filter.
     pub fn staged(self) -> Self {
         self.set(|settings| settings.staged = true)

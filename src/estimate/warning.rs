@@ -117,7 +117,8 @@ pub enum WarningCode {
     Outliers,
     /// An initial state that neither the user nor the outputs give a start for.
     GuessedStart,
-    /// The declared start cannot be simulated; the search began where stages led it ([`Fit::staged`](crate::Fit::staged)).
+    /// The search began where stages led a start that cannot be simulated, or from where a simulation loses the measurements
+    /// ([`Fit::staged`](crate::Fit::staged)).
     Staged,
     /// Time jumps within a record.
     TimeGaps,

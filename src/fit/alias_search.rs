@@ -47,7 +47,7 @@ impl Problem<'_> {
         frequencies.extend(others.iter().map(|(frequency, _)| number(*frequency, 3)));
         frequencies.dedup();
         let search = |(_, coordinates): (f64, Vec<f64>)| {
-            let start = Start { coordinates, trials, ends: None, before: (0, 0) };
+            let start = Start { coordinates, trials, ends: None, stages: None };
             let end = problem.run_on(problem.run_within(begin, control, start), trials, begin, control);
             self.refined(end, finest.method, begin, control).ok()
         };

@@ -2,6 +2,7 @@
 //! half the frequency of sampling, and from further starts where an output is left unexplained.
 
 use super::refine::{Start, is_only_coarse, is_useless};
+use super::stages::Led;
 use crate::error::Error;
 use crate::estimate::{About, Summary, Warning, WarningCode};
 use crate::numeral::counted;
@@ -171,6 +172,7 @@ impl Problem<'_> {
         if control.stops()
             || !leaves_unexplained(found)
             || self.settings.searches != SearchPlan::Single
+            || self.settings.staged
             || predicted
             || hopeless.into_iter().any(|code| is_useless(found, code))
         {
@@ -178,9 +180,9 @@ impl Problem<'_> {
         }
         let trials = Trials::of(FROM_A_START, found.iterations, self.settings.optimizer.most())?.most;
         let begin = Instant::now();
-        if let Some((best, stages)) =
-            self.run_in_stages(trials, begin, control).filter(|(best, _)| !leaves_unexplained(best))
-        {
+        let been_there = found.warnings.iter().any(|warning| warning.code == WarningCode::Staged);
+        let staged = if been_there { None } else { self.run_in_stages(trials, begin, control) };
+        if let Some((best, stages)) = staged.filter(|(best, _)| !leaves_unexplained(best)) {
             let (best, way) = (Box::new(best), Way::Stages(stages));
             return Some(Further::Found { best, way, stopped: control.stops(), time: begin.elapsed() });
         }
@@ -205,32 +207,55 @@ impl Problem<'_> {
 
     /// The estimate from where stages led the declared start, and how many; `None` where they led nowhere.
     fn run_in_stages(&self, trials: u64, begin: Instant, control: &Control) -> Option<(Summary, u32)> {
-        let stages = self.stages().filter(|_| !self.settings.staged)?;
-        let (start, stages) = stages.declared(control)?;
-        let mut found = self.run_within(begin, control, Start { trials, ..start }).ok()?;
+        // A checkpoint is that of the search before.
+        let settings = Settings { checkpoint: None, ..self.settings.clone() };
+        let problem = Problem { settings, ..self.clone() };
+        let start = problem.stages().ok()?.declared(control)?;
+        let count = start.stages.map_or(0, |led| led.stages);
+        let mut found = problem.run_within(begin, control, Start { trials, ..start }).ok()?;
         if is_only_coarse(&found) {
-            found = self.refined(Ok(found), 0, begin, control).ok()?;
+            found = problem.refined(Ok(found), 0, begin, control).ok()?;
         }
-        Some((found, stages))
+        Some((found, count))
     }
 
-    /// The estimate from where stages led a start that cannot be simulated, with a note; the error where they led nowhere.
-    pub(super) fn or_in_stages(
-        &self,
-        found: Result<Summary, Error>,
-        begin: Instant,
-        control: &Control,
-    ) -> Result<Summary, Error> {
-        let Err(Error::Start(failure)) = found else { return found };
-        let trials = self.settings.optimizer.most();
-        let led = match self.settings.searches {
-            SearchPlan::Single => self.run_in_stages(trials, begin, control),
-            SearchPlan::All(_) | SearchPlan::Best(_) => None,
+    /// An estimate with a note of the stages that were asked for.
+    pub(super) fn told_of_stages(&self, mut found: Summary, led: Option<Led>) -> Summary {
+        if !self.settings.staged {
+            return found;
+        }
+        let text = match (led, self.stages()) {
+            (_, Err(reason)) => format!("stages were asked for, but there are none: {reason}"),
+            (Some(led), _) => {
+                let count = counted(led.stages.into(), "stage");
+                format!("the search began where {count} ({STAGES}) led the declared start")
+            }
+            (None, _) if self.settings.searches.count() > 1 => format!("each search began where stages ({STAGES}) led its start"),
+            (None, _) => "stages were asked for, but led the declared start no nearer to the measurements; the search began there".to_owned(),
         };
-        let Some((mut found, stages)) = led else { return Err(Error::Start(failure)) };
+        found.warnings.push(Warning::new(WarningCode::Staged, Severity::Usable, text).about(About::Search));
+        found
+    }
+
+    /// The estimate, or that from where stages led a start that cannot be simulated.
+    pub(super) fn or_in_stages(&self, found: Result<Summary, Error>, control: &Control) -> Result<Summary, Error> {
+        let error = match found {
+            Ok(found) => return Ok(found),
+            Err(error) => error,
+        };
+        self.in_stages_of(&error, control).ok_or(error)
+    }
+
+    /// The estimate from where stages led a start that cannot be simulated, with a note; `None` where they led nowhere, and of other errors.
+    pub(super) fn in_stages_of(&self, error: &Error, control: &Control) -> Option<Summary> {
+        let single = self.settings.searches == SearchPlan::Single && !self.settings.staged;
+        if !(single && matches!(error, Error::Start(_))) {
+            return None;
+        }
+        let (mut found, stages) = self.run_in_stages(self.settings.optimizer.most(), Instant::now(), control)?;
         let text = format!("the declared start cannot be simulated, so that the fit {}", Way::Stages(stages).said());
         found.warnings.push(Warning::new(WarningCode::Staged, Severity::Usable, text).about(About::Search));
-        Ok(found)
+        Some(found)
     }
 
     /// Whether several pieces of records like the first one run together in vector registers.
@@ -239,9 +264,20 @@ impl Problem<'_> {
     }
 }
 
+/// An estimate with the evaluations of the stages that led to its start, and a note where a simulation from there loses the measurements.
+pub(super) fn led_by(found: Summary, led: Led) -> Summary {
+    let mut found = Summary { evaluations: found.evaluations + led.evaluations, ..found };
+    if !led.follows && leaves_unexplained(&found) {
+        let text = "predictions of a filter that corrects the state at each sample led to where this search began, and a simulation from there does \
+                    not follow the measurements: the plant may be unstable, chaotic or disturbed; take Kalman, with Model::diffusion and Model::noise";
+        found.warnings.push(Warning::new(WarningCode::Staged, Severity::Usable, text.to_owned()).about(About::Search));
+    }
+    found
+}
+
 /// Whether an estimate is not usable and leaves an output unexplained. That may not be the reason by itself: where the loss is robust
 /// or measurements are weighted, it is a warning only.
-fn leaves_unexplained(found: &Summary) -> bool {
+pub(super) fn leaves_unexplained(found: &Summary) -> bool {
     let of_an_output = |warning: &Warning| matches!(warning.about, About::Output(_));
     let unexplained = |warning: &Warning| warning.code == WarningCode::Unexplained && of_an_output(warning);
     found.severity() == Severity::NotUsable && found.warnings.iter().any(unexplained)

@@ -1,6 +1,6 @@
 //! Fits of single records in lockstep: one evaluation of all of them is one pass over lanes.
 
-use super::elsewhere::{Further, with_work_of};
+use super::elsewhere::{Further, led_by, with_work_of};
 use super::refine::{Attempt, Start};
 use super::search::{Rounds, at_end, ended, settled};
 use crate::covariance::SearchEnd;
@@ -135,10 +135,23 @@ impl<'p> Search<'p> {
 /// fit of each alone.
 pub(super) fn fit_together(problems: &[Problem<'_>]) -> Vec<Result<Summary, Error>> {
     let Some(control) = problems.first().map(|first| control(first, problems.len())) else { return vec![] };
-    let all: Vec<From<'_>> = problems.iter().map(|problem| (problem, problem.first_start(&control))).collect();
-    let begin = Instant::now();
-    let found = by_one_method(&all, &control).into_iter().zip(problems);
-    let found: Vec<_> = found.map(|(found, problem)| problem.or_in_stages(found, begin, &control)).collect();
+    let starts = each(problems.len(), |i| problems[i].first_start(&control));
+    let all: Vec<From<'_>> = problems.iter().zip(starts).collect();
+    let told = |(found, (problem, start)): (Result<Summary, Error>, &From<'_>)| {
+        let led = start.stages;
+        found.map(|found| {
+            problem.told_of_stages(
+                match led {
+                    Some(led) => led_by(found, led),
+                    None => found,
+                },
+                led,
+            )
+        })
+    };
+    let found: Vec<_> = by_one_method(&all, &control).into_iter().zip(&all).map(told).collect();
+    let failed = each(found.len(), |i| problems[i].in_stages_of(found[i].as_ref().err()?, &control));
+    let found: Vec<_> = found.into_iter().zip(failed).map(|(found, staged)| staged.map_or(found, Ok)).collect();
     let further = each(found.len(), |i| problems[i].search_further(found[i].as_ref().ok()?, &control));
     let found = found.into_iter().zip(&further);
     let found: Vec<_> =

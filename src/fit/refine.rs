@@ -1,5 +1,6 @@
 //! Fits whose integrator was not chosen: finer methods, as long as a finer step would move an unknown.
 
+use super::stages::Led;
 use crate::error::Error;
 use crate::estimate::{About, Starts, Summary, Unknown, Warning, WarningCode};
 use crate::numeral::{number, unit_after};
@@ -33,14 +34,14 @@ pub(super) struct Start {
     pub trials: u64,
     /// Where earlier searches from several starts ended; those of this method begin there.
     pub ends: Option<Starts>,
-    /// Iterations and evaluations of the stages that led to it.
-    pub before: (u64, u64),
+    /// The stages that led to it, if any.
+    pub stages: Option<Led>,
 }
 
 impl Start {
     /// The declared start of a problem.
     pub fn declared(problem: &Problem<'_>) -> Self {
-        Start { coordinates: problem.unknowns.start(), trials: u64::MAX, ends: None, before: (0, 0) }
+        Start { coordinates: problem.unknowns.start(), trials: u64::MAX, ends: None, stages: None }
     }
 }
 
@@ -97,7 +98,7 @@ impl Attempt {
             Ok(found) if is_only_coarse(found) || lacks_starts_only(found) => {
                 let within = |(x, (lower, upper)): (f64, (f64, f64))| x.max(lower).min(upper);
                 let coordinates = found.coordinates().into_iter().zip(finer.unknowns.bounds()).map(within).collect();
-                Some(Start { coordinates, trials, ends: found.starts.clone(), before: (0, 0) })
+                Some(Start { coordinates, trials, ends: found.starts.clone(), stages: None })
             }
             _ => declared_start(finer, trials, control),
         }
@@ -188,7 +189,7 @@ fn declared_start(finer: &Problem<'_>, trials: u64, control: &Control) -> Option
     let start = finer.unknowns.start();
     let steps = finer.in_units(control);
     let fine = finer.sweep.is_adaptive() || !steps.step_decides(&start).unwrap_or(true);
-    fine.then_some(Start { coordinates: start, trials, ends: None, before: (0, 0) })
+    fine.then_some(Start { coordinates: start, trials, ends: None, stages: None })
 }
 
 /// The warning where the data do not distinguish the estimate from that of a coarser step.
@@ -246,7 +247,7 @@ impl Problem<'_> {
                 break;
             }
             before = found.deviance;
-            let start = Start { coordinates: found.coordinates(), trials, ends: None, before: (0, 0) };
+            let start = Start { coordinates: found.coordinates(), trials, ends: None, stages: None };
             found = after(&found, self.run_within(begin, control, start)?);
             if let Outcome::OwnLimit { iterations, .. } = &mut found.outcome {
                 *iterations = found.iterations;

@@ -1,6 +1,6 @@
 //! Running a problem: search, estimate at a given point, objective, prediction, states.
 
-use super::elsewhere::with_work_of;
+use super::elsewhere::{led_by, with_work_of};
 use super::predict::asked;
 use super::refine::{Attempt, Start};
 use super::search::{at_end, search, settled};
@@ -10,7 +10,7 @@ use crate::covariance::SearchEnd;
 use crate::error::Error;
 use crate::estimate::Summary;
 use crate::judge::conclude;
-use crate::optimize::{Domain, LeastSquares, LevenbergMarquardt};
+use crate::optimize::{Domain, LeastSquares, LevenbergMarquardt, Outcome};
 use crate::problem::{Control, Objective, Problem, Simulated, Whitening, noise};
 use crate::record::Record;
 use crate::sweep::States;
@@ -33,8 +33,8 @@ impl Problem<'_> {
     /// cannot be simulated, is followed by finer ones.
     pub(super) fn run_since(&self, begin: Instant) -> Result<Summary, Error> {
         let control = self.control(begin);
-        let found = self.run_within(begin, &control, self.first_start(&control));
-        let found = self.or_in_stages(found, begin, &control);
+        let found = self.run_first(begin, &control);
+        let found = self.or_in_stages(found, &control);
         // Before finer methods, each of which takes several times as long.
         let further = found.as_ref().ok().and_then(|found| self.search_further(found, &control));
         let found = found.map(|found| with_work_of(found, further.as_ref()));
@@ -45,12 +45,25 @@ impl Problem<'_> {
         Ok(self.searched_elsewhere(&found, further.as_ref(), &control).unwrap_or(found))
     }
 
-    /// Where the search begins: at the declared start, or where stages led it if they were asked for.
+    /// The estimate from the declared start, or from where stages led it if they were asked for.
+    fn run_first(&self, begin: Instant, control: &Control) -> Result<Summary, Error> {
+        let start = self.first_start(control);
+        let led = start.stages;
+        let found = if led.is_some() && control.stops() {
+            // Where the stages were stopped is the best point so far.
+            let found = self.run_within(begin, &NEVER, Start { trials: 1, ..start })?;
+            Summary { outcome: control.named(Outcome::Cancelled), ..found }
+        } else {
+            self.run_within(begin, control, start)?
+        };
+        Ok(self.told_of_stages(found, led))
+    }
+
+    /// Where the search begins.
     pub(super) fn first_start(&self, control: &Control) -> Start {
-        let single = self.settings.searches.count() == 1;
-        let stages = if self.settings.staged && single { self.stages() } else { None };
-        let led = stages.and_then(|stages| stages.declared(control));
-        led.map_or_else(|| Start::declared(self), |(start, _)| start)
+        let single = self.settings.staged && self.settings.searches.count() == 1;
+        let stages = if single { self.stages().ok() } else { None };
+        stages.and_then(|stages| stages.declared(control)).unwrap_or_else(|| Start::declared(self))
     }
 
     /// The estimate by a method, numbered as in [`by_method`](Self::by_method), or by a finer one, as long as a finer step would
@@ -87,11 +100,12 @@ impl Problem<'_> {
             1 => SearchEnd { starts: start.ends, ..search(&plain, &optimizer, start.coordinates)? },
             count => search_from_many(&plain, &optimizer, count, start.ends.as_ref())?,
         };
-        let (iterations, evaluations) = start.before;
-        let end =
-            SearchEnd { iterations: end.iterations + iterations, evaluations: end.evaluations + evaluations, ..end };
         let end = settled(&plain, end);
-        conclude(&at_end(&plain, &end), &end, begin.elapsed().as_secs_f64())
+        let found = conclude(&at_end(&plain, &end), &end, begin.elapsed().as_secs_f64())?;
+        Ok(match start.stages {
+            Some(led) => led_by(found, led),
+            None => found,
+        })
     }
 
     /// The stop conditions of a run that began then: flag and time limit.

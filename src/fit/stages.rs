@@ -8,7 +8,7 @@
 use super::refine::Start;
 use super::search::search;
 use crate::predict::{GivenNoise, Guess};
-use crate::problem::{Control, Noise, Problem, SearchPlan, Settings};
+use crate::problem::{Control, Noise, Problem, SearchPlan, Settings, noise};
 use crate::record::{Channel, Record};
 
 /// The least noise of an output, as a part of half its range.
@@ -32,51 +32,53 @@ const MOST_STATES: usize = 6;
 /// The stages of a problem.
 pub(super) struct Stages<'p> {
     problem: &'p Problem<'p>,
-    /// The noise of each output, in its unit.
-    noise: Vec<f64>,
-    /// Half the range of each output.
-    halves: Vec<f64>,
+    outputs: Vec<Moves>,
     /// The mean interval of the samples (s).
     step: f64,
     /// How fast the outputs change: by half their range in the time `1 / rate` (1/s).
     rate: f64,
 }
 
-/// Where stages led a start.
+/// Stages that led a start.
+#[derive(Clone, Copy, Default)]
 pub(super) struct Led {
-    pub coordinates: Vec<f64>,
     pub stages: u32,
-    /// Iterations and evaluations.
-    pub work: (u64, u64),
+    pub evaluations: u64,
+    /// Whether a simulation from their end follows the measurements as well as the predictions do.
+    pub follows: bool,
 }
 
 impl Problem<'_> {
-    /// The stages of this problem; `None` where the slopes of the equations are not known, where there are too many states, or where no
-    /// output moves.
-    pub(super) fn stages(&self) -> Option<Stages<'_>> {
+    /// The stages of this problem.
+    ///
+    /// # Errors
+    /// Why there are none.
+    pub(super) fn stages(&self) -> Result<Stages<'_>, &'static str> {
         let layout = self.layout();
-        let n = layout.states.len();
-        if !(1..=MOST_STATES).contains(&n) || self.settings.prefilter.is_some() {
-            return None;
+        if self.sweep.predicts_variance() || self.sweep.restarts().is_some() {
+            return Err("the predictor corrects the state by itself");
         }
-        let most = |of: &dyn Fn(&Record) -> f64| self.records.iter().map(of).fold(0.0, f64::max);
-        let half = |j: usize| {
-            move |record: &Record| {
-                let range = record.inspect_some().outputs[j].range;
-                range.map_or(0.0, |(least, greatest)| 0.5 * (greatest - least))
-            }
-        };
-        let outputs: Vec<f64> = (0..layout.outputs.len()).map(|j| most(&half(j))).collect();
-        let first = self.records.first()?;
-        let (length, intervals) = (first.time(first.len() - 1) - first.time(0), first.len().saturating_sub(1));
-        let step = length / intervals as f64;
-        let rates = first.outputs().iter().zip(&outputs).filter_map(|(channel, half)| rate(channel, *half));
-        let rate = rates.fold(0.0, f64::max) / step;
-        if !(rate > 0.0 && rate.is_finite()) {
-            return None;
+        if layout.states.is_empty() {
+            return Err("the model has no state");
         }
-        let noise = first.outputs().iter().zip(&outputs).map(|(channel, half)| noise(channel, *half)).collect();
-        Some(Stages { problem: self, noise, halves: outputs, step, rate })
+        if layout.states.len() > MOST_STATES {
+            return Err("the model has more than six states");
+        }
+        if self.settings.prefilter.is_some() {
+            return Err("the errors are filtered");
+        }
+        let moves = |j: usize| Moves::of(self.records.iter().map(|record| (record, &record.outputs()[j])));
+        let outputs: Vec<Moves> = (0..layout.outputs.len()).map(moves).collect();
+        let rate = outputs.iter().map(|moves| moves.rate).fold(0.0, f64::max);
+        let first = self.records.first().filter(|first| first.len() > 1);
+        let step = first.map_or(0.0, |first| (first.time(first.len() - 1) - first.time(0)) / (first.len() - 1) as f64);
+        if !(rate > 0.0 && rate.is_finite() && step > 0.0) {
+            return Err("no output moves");
+        }
+        let stages = Stages { problem: self, outputs, step, rate };
+        let is_compiled = stages.problem(step).is_some();
+        let reason = "the model is not compiled: it cannot be read as a graph, or the integrator chooses its steps";
+        is_compiled.then_some(stages).ok_or(reason)
     }
 
     /// The size of each state: of those that the outputs give, what moves these by half their range; of the others, what moves the derivatives of
@@ -103,27 +105,51 @@ impl Problem<'_> {
     }
 }
 
-/// How fast an output changes: by half its range in so many samples, from the shortest of lags that double; the inverse of that number.
-fn rate(channel: &Channel, half: f64) -> Option<f64> {
-    let values = &*channel.values;
-    let mean_square = |lag: usize| {
-        let pairs =
-            values.iter().zip(&values[lag..]).map(|(a, b)| (b - a) * (b - a)).filter(|square| square.is_finite());
-        let (sum, count) = pairs.fold((0.0, 0.0), |(sum, count), square| (sum + square, count + 1.0));
-        if count > 0.0 { sum / count } else { 0.0 }
-    };
-    let lags = std::iter::successors(Some(1), |lag| Some(2 * lag)).take_while(|lag| *lag < values.len());
-    let found = lags.map(|lag| (lag, mean_square(lag))).find(|(_, square)| *square >= 0.25 * half * half && half > 0.0);
-    found.map(|(lag, _)| 0.5 / lag as f64)
+/// How an output moves, by its measured samples in all records.
+struct Moves {
+    /// Half its range, in its unit.
+    half: f64,
+    /// Its noise, from second differences, which what moves slowly hardly changes; at least a small part of `half`.
+    noise: f64,
+    /// It changes by `half` in the time `1 / rate` (1/s); 0 where it does not move.
+    rate: f64,
 }
 
-/// The noise of an output, from its second differences, which what moves slowly hardly changes.
-fn noise(channel: &Channel, half: f64) -> f64 {
-    let second = channel.values.windows(3).map(|three| three[0] - 2.0 * three[1] + three[2]);
-    let (sum, count) = second.filter(|d| d.is_finite()).fold((0.0, 0.0), |(sum, count), d| (sum + d * d, count + 1.0));
-    // A sum of independent errors with weights 1, -2 and 1 has six times their variance.
-    let noise = if count > 0.0 { (sum / count / 6.0_f64).sqrt() } else { 0.0 };
-    noise.max(LEAST_NOISE * half)
+impl Moves {
+    fn of<'r>(channels: impl Iterator<Item = (&'r Record, &'r Channel)>) -> Self {
+        let measured = |(record, channel): (&Record, &Channel)| -> (Vec<f64>, f64) {
+            let samples: Vec<usize> = (0..record.len()).filter(|&k| channel.values[k].is_finite()).collect();
+            let ends = samples.first().zip(samples.last());
+            let length = ends.map_or(0.0, |(first, last)| record.time(*last) - record.time(*first));
+            (samples.into_iter().map(|k| channel.values[k]).collect(), length)
+        };
+        let all: Vec<(Vec<f64>, f64)> = channels.map(measured).collect();
+        let range = |values: &Vec<f64>| {
+            let ends = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), y| (a.min(*y), b.max(*y)));
+            (ends.1 - ends.0).max(0.0)
+        };
+        let half = 0.5 * all.iter().map(|(values, _)| range(values)).fold(0.0, f64::max);
+        let mean_square = |differences: &mut dyn Iterator<Item = f64>| {
+            let (sum, count) = differences.fold((0.0, 0.0), |(sum, count), d| (sum + d * d, count + 1.0));
+            if count > 0.0 { sum / count } else { 0.0 }
+        };
+        let mut second = all.iter().flat_map(|(values, _)| values.windows(3).map(|y| y[0] - 2.0 * y[1] + y[2]));
+        // A sum of independent errors with weights 1, -2 and 1 has six times their variance.
+        let noise = (mean_square(&mut second) / 6.0).sqrt().max(LEAST_NOISE * half);
+        // The record in which it moves the most, by lags that double.
+        let most = all.iter().max_by(|a, b| range(&a.0).total_cmp(&range(&b.0)));
+        let rate =
+            most.filter(|(values, length)| half > 0.0 && values.len() > 1 && *length > 0.0).map(|(values, length)| {
+                let interval = length / (values.len() - 1) as f64;
+                let lags = std::iter::successors(Some(1), |lag| Some(2 * lag)).take_while(|lag| *lag < values.len());
+                let far = |lag: &usize| {
+                    let mut differences = values.iter().zip(&values[*lag..]).map(|(a, b)| b - a);
+                    mean_square(&mut differences) >= 0.25 * half * half
+                };
+                lags.into_iter().find(far).map_or(length.recip(), |lag| 0.5 / (lag as f64 * interval))
+            });
+        Moves { half, noise, rate: rate.unwrap_or(0.0) }
+    }
 }
 
 impl Stages<'_> {
@@ -132,18 +158,19 @@ impl Stages<'_> {
     fn problem(&self, memory: f64) -> Option<Problem<'_>> {
         let problem = self.problem;
         let scales = problem.scales(problem.records.first()?, self.rate.max(memory.recip()))?;
-        let part = self.noise.iter().zip(&self.halves).map(|(noise, half)| noise / half);
-        let part = part.filter(|part| part.is_finite()).fold(LEAST_NOISE, f64::max) * self.step / memory;
+        let part = self.outputs.iter().filter(|moves| moves.half > 0.0).map(|moves| moves.noise / moves.half);
+        let part = part.fold(LEAST_NOISE, f64::max) * self.step / memory;
         let positive = |level: f64| if level > 0.0 { level } else { 1.0 };
         let noise = GivenNoise {
             states: scales.iter().map(|scale| part * positive(*scale)).collect(),
-            outputs: self.noise.iter().map(|noise| positive(*noise)).collect(),
+            outputs: self.outputs.iter().map(|moves| positive(moves.noise)).collect(),
         };
         let sweep = problem.sweep.filtering(&noise)?;
         let optimizer = problem.settings.optimizer.limited(TRIALS);
         let settings = Settings {
             noise: Noise::Predicted,
             checkpoint: None,
+            observers: vec![],
             searches: SearchPlan::Single,
             optimizer,
             ..problem.settings.clone()
@@ -152,28 +179,14 @@ impl Stages<'_> {
         Problem::new(sweep, problem.records.clone(), parameters, settings).ok()
     }
 
-    /// The root of the mean square error of each output, by the predictor of a problem; `None` where it cannot be evaluated.
-    fn errors(&self, problem: &Problem<'_>, coordinates: &[f64], control: &Control) -> Option<Vec<f64>> {
-        let objective = problem.in_units(control);
-        let mut sums = vec![(0.0, 0.0); self.noise.len()];
-        for e in 0..problem.records.len() {
-            let simulated = objective.predict(e, coordinates).ok()?;
-            for (sum, errors) in sums.iter_mut().zip(&simulated.residuals) {
-                let errors = errors.iter().filter(|error| error.is_finite());
-                *sum = errors.fold(*sum, |(sum, count), error| (sum + error * error, count + 1.0));
-            }
-        }
-        Some(sums.into_iter().map(|(sum, count)| (sum / count).sqrt()).collect())
-    }
-
     /// The memory of the first stage (s): so short that the outputs change little, and that predictions from a start are near the measurements.
     fn first_memory(&self, start: &[f64], control: &Control) -> f64 {
         let least = FIRST_MEMORY * self.step;
         let mut memory = (FIRST_MEMORY / self.rate).max(least);
         let follows = |memory: f64| {
             let problem = self.problem(memory)?;
-            let errors = self.errors(&problem, start, control)?;
-            Some(errors.iter().zip(&self.noise).all(|(error, noise)| *error <= NEAR * noise || *noise == 0.0))
+            let errors = errors(&problem, start, control)?;
+            Some(errors.iter().zip(&self.outputs).all(|(e, moves)| *e <= NEAR * moves.noise || moves.half == 0.0))
         };
         while memory > least && follows(memory) != Some(true) && !control.stops() {
             memory = (memory / LONGER).max(least);
@@ -181,39 +194,52 @@ impl Stages<'_> {
         memory
     }
 
-    /// Leads a start to where a simulation follows the measurements as well as the predictions do, or through all stages that explain them; `None`
-    /// where a stage fails.
-    pub fn lead(&self, start: Vec<f64>, control: &Control) -> Option<Led> {
-        let mut led = Led { coordinates: start, stages: 0, work: (0, 0) };
-        let mut memory = self.first_memory(&led.coordinates, control);
-        for stage in 0..MOST {
+    /// Where stages lead a start: to where a simulation follows the measurements as well as the predictions do, or through all stages that explain
+    /// them; `None` where a stage fails, or where a simulation is no nearer to the measurements than from the start.
+    pub fn lead(&self, start: &[f64], control: &Control) -> Option<(Vec<f64>, Led)> {
+        let mut memory = self.first_memory(start, control);
+        let (mut coordinates, mut led) = (start.to_vec(), Led::default());
+        for stage in 1..=MOST {
             if control.stops() {
-                return None;
+                break;
             }
             let problem = self.problem(memory)?;
             memory *= LONGER;
             let plain = problem.in_units(control);
-            let end = search(&plain, &problem.settings.optimizer, led.coordinates.clone()).ok()?;
-            led.work = (led.work.0 + end.iterations, led.work.1 + end.evaluations);
-            led.coordinates = end.coordinates;
-            led.stages = stage + 1;
-            let predicted = self.errors(&problem, &led.coordinates, control)?;
-            if predicted.iter().zip(&self.halves).any(|(error, half)| *error > UNEXPLAINED * half) {
+            let end = search(&plain, &problem.settings.optimizer, coordinates.clone()).ok()?;
+            coordinates = end.coordinates;
+            led.stages = stage;
+            led.evaluations += end.evaluations;
+            let Some(predicted) = errors(&problem, &coordinates, control) else { break };
+            let unexplained = |(error, moves): (&f64, &Moves)| moves.half > 0.0 && *error > UNEXPLAINED * moves.half;
+            if predicted.iter().zip(&self.outputs).any(unexplained) {
                 break;
             }
-            let simulated = self.errors(self.problem, &led.coordinates, control);
-            let follows = |(simulated, predicted): (&f64, &f64)| *simulated <= FOLLOWS * predicted;
-            if simulated.is_some_and(|simulated| simulated.iter().zip(&predicted).all(follows)) {
+            let simulated = errors(self.problem, &coordinates, control);
+            let as_well = |(simulated, predicted): (&f64, &f64)| *simulated <= FOLLOWS * predicted;
+            led.follows = simulated.is_some_and(|simulated| simulated.iter().zip(&predicted).all(as_well));
+            if led.follows {
                 break;
             }
         }
-        Some(led)
+        let distance = |at: &[f64]| {
+            let errors = errors(self.problem, at, &Control::NEVER)?;
+            let parts = errors.iter().zip(&self.outputs).filter(|(_, moves)| moves.half > 0.0);
+            Some(parts.map(|(error, moves)| (error / moves.half).powi(2)).sum::<f64>())
+        };
+        let nearer = distance(&coordinates).is_some_and(|led| distance(start).is_none_or(|start| led < start));
+        nearer.then_some((coordinates, led))
     }
 
-    /// The start to which stages led the declared one, and how many there were.
-    pub fn declared(&self, control: &Control) -> Option<(Start, u32)> {
+    /// The start to which stages lead the declared one.
+    pub fn declared(&self, control: &Control) -> Option<Start> {
         let declared = Start::declared(self.problem);
-        let Led { coordinates, stages, work } = self.lead(declared.coordinates.clone(), control)?;
-        Some((Start { coordinates, before: work, ..declared }, stages))
+        let (coordinates, led) = self.lead(&declared.coordinates, control)?;
+        Some(Start { coordinates, stages: Some(led), ..declared })
     }
+}
+
+/// The root of the mean square error of each output, by the predictor of a problem; `None` where it cannot be evaluated.
+fn errors(problem: &Problem<'_>, coordinates: &[f64], control: &Control) -> Option<Vec<f64>> {
+    noise::errors(&problem.in_units(control), coordinates).ok()
 }

@@ -81,17 +81,15 @@ pub(super) fn search_from_many(
     if let Some(earlier) = earlier {
         return again::search_again(plain, optimizer, earlier);
     }
-    let mut starts = draw::starts(plain, count);
-    if let Some(stages) = plain.problem.settings.staged.then(|| plain.problem.stages()).flatten() {
-        let lead = |i: usize| stages.lead(starts[i].clone(), plain.control).map(|led| led.coordinates);
-        let led = each(count, lead);
-        starts = starts.into_iter().zip(led).map(|(start, led)| led.unwrap_or(start)).collect();
-    }
+    let starts = draw::starts(plain, count);
     let file = checkpoint(plain, optimizer)?;
     let resumed = file.as_ref().map(CheckpointFile::load::<Places>).transpose()?.flatten();
-    let (cycle, places) = match resumed {
-        Some((_, cycle, Some(places))) if places.0.len() == count => (cycle, places.0),
-        _ => (0, starts.iter().cloned().map(Ok).collect::<Vec<_>>()),
+    let (cycle, places, led) = match resumed {
+        Some((_, cycle, Some(places))) if places.0.len() == count => (cycle, places.0, 0),
+        _ => {
+            let (led, evaluations) = in_stages(plain, &starts);
+            (0, led.into_iter().map(Ok).collect(), evaluations)
+        }
     };
     // The declared start is evaluated whatever the limits, so that there is an answer.
     let begin = |i: usize| match i > 0 && plain.control.stops() {
@@ -110,7 +108,19 @@ pub(super) fn search_from_many(
         return Err(declared_error(plain, &starts[0]));
     };
     let end = ends.into_iter().nth(best).and_then(Result::ok).ok_or_else(|| declared_error(plain, &starts[0]))?;
+    let found = Starts { evaluations: found.evaluations + led, ..found };
     Ok(SearchEnd { starts: Some(found), write_error: file.and_then(|file| file.write_error()), ..end })
+}
+
+/// Where stages lead these starts, if they were asked for, and their evaluations.
+fn in_stages(plain: &Objective<'_>, starts: &[Vec<f64>]) -> (Vec<Vec<f64>>, u64) {
+    let Some(stages) = plain.problem.settings.staged.then(|| plain.problem.stages().ok()).flatten() else {
+        return (starts.to_vec(), 0);
+    };
+    let led = each(starts.len(), |i| stages.lead(&starts[i], plain.control));
+    let evaluations = led.iter().flatten().map(|(_, led)| led.evaluations).sum();
+    let places = led.into_iter().zip(starts).map(|(led, start)| led.map_or_else(|| start.clone(), |(led, _)| led));
+    (places.collect(), evaluations)
 }
 
 /// Why nothing came of any start: the error of the declared one.

@@ -97,6 +97,11 @@ fn moments(((objective, coordinates), clip): Asked<'_>) -> Result<SquareMatrix, 
     covariance(&plain.gather(coordinates, false, |experiment| Moments::new(&plain, experiment, clip))?)
 }
 
+/// The root of the mean square error of each output at a point, in its unit.
+pub(crate) fn errors(objective: &Objective<'_>, coordinates: &[f64]) -> Result<Vec<f64>, Infeasible> {
+    Ok(moments(((objective, coordinates), None))?.diagonal().iter().map(|variance| variance.sqrt()).collect())
+}
+
 /// The moments of several objectives of one record each. One that fails in lanes is asked alone.
 fn moments_together(asked: &[Asked<'_>]) -> Vec<Result<SquareMatrix, Infeasible>> {
     let plain: Vec<Objective<'_>> = asked.iter().map(|((objective, _), _)| objective.in_units()).collect();

@@ -42,7 +42,11 @@ impl Disturbance {
         let a: Vec<f64> = (0..n).flat_map(|i| rows.row(i).to_vec()).collect();
         let mut q = vec![0.0; n * n];
         q.iter_mut().step_by(n + 1).zip(levels).for_each(|(q, level)| *q = level * level);
-        let factor = factor(n, Transition::over(n, &a, &q, h).covariance());
+        let covariance = Transition::over(n, &a, &q, h).covariance();
+        if covariance.iter().any(|entry| !entry.is_finite()) {
+            return M::State::from_fn(|_| f64::NAN);
+        }
+        let factor = factor(n, covariance);
         M::State::from_fn(|i| end[i] + (0..=i).map(|j| factor[i * n + j] * normal[j]).sum::<f64>())
     }
 }

@@ -137,7 +137,12 @@ fn smooth(layout: &Layout, visited: &[Visited]) -> States {
         let moved = turned(n, &p, &gradient, 1);
         let taken = symmetric(n, &p, &curvature);
         let mean = x.iter().zip(moved).map(|(x, moved)| x - moved).collect();
-        found.push((mean, p.iter().zip(taken).map(|(p, taken)| p - taken).collect()));
+        // What the difference of two numbers leaves is no smaller than their rounding.
+        let left = |(at, (p, taken)): (usize, (&f64, f64))| match at % (n + 1) {
+            0 => (p - taken).max(n as f64 * f64::EPSILON * p),
+            _ => p - taken,
+        };
+        found.push((mean, p.iter().zip(taken).enumerate().map(left).collect()));
         for Update { row, gain, error, variance } in updates.iter().rev() {
             // I - k c
             let left = |at: usize| f64::from(u8::from(at / n == at % n)) - gain[at / n] * row[at % n];
