@@ -241,8 +241,23 @@ impl<'a, M: Made> Fit<'a, M> {
     /// on the parameters, where a simulation would leave the measurements, diverge, or end in one of many minima.
     ///
     /// Without it, a fit does so by itself where the declared start cannot be simulated, or where the search from there leaves an output
-    /// unexplained; after `starts(1)` it does not. After `staged()` it searches from no 32 starts. A start from which a stage fails stays as it is. Stages need a model that can be read as a graph,
-    /// of at most six states, and no pre-filter.
+    /// unexplained; after `starts(1)` it does not. A fit that was asked for stages searches from no further starts by itself. A start that the
+    /// stages bring no nearer to the measurements stays as it is. Stages need a model that can be read as a graph, of one to six states, an
+    /// integrator of fixed steps, a simulation to be predicted ([`FreeRun`](crate::FreeRun), the default), and no pre-filter; the estimate says
+    /// what came of them ([`WarningCode::Staged`](crate::WarningCode::Staged)). Their evaluations are counted, their trial steps (100 each at most)
+    /// are not.
+    ///
+    /// ```
+    /// # use greybox::{Experiment, Fit, free, pmsm::{Surface, Winding}};
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// # let model = Surface::new(4)?;
+    /// # let record = Experiment::from_file(&model, "examples/data/pmsm.csv")?;
+    /// let start = Winding { rs: free(60.0), ls: free(1e-4), ke: free(-9.0) }; // truth: 0.63 ohm, 4 mH, 0.95 V s/rad
+    /// let estimate = Fit::new(&model, &record).parameters(start).staged().run()?;
+    /// assert!((estimate.parameters.ls / 4e-3 - 1.0).abs() < 0.01);
+    /// # Ok(())
+    /// # }
+    /// ```
     pub fn staged(self) -> Self {
         self.set(|settings| settings.staged = true)
     }
@@ -291,12 +306,12 @@ impl<'a, M: Made> Fit<'a, M> {
     ///
     /// A search that does not converge is an outcome of the estimate, not an error. Where samples leave open at which of two
     /// frequencies the model oscillates ([`WarningCode::Aliased`](crate::WarningCode::Aliased)), further searches begin at the other
-    /// one; where an output is left unexplained, they begin at further [`starts`](Fit::starts). Each has the
+    /// one; where an output is left unexplained, they go on in [stages](Fit::staged), or begin at further [`starts`](Fit::starts). Each has the
     /// trial steps that the first one left of its limit, or a few times those it took; all of them end within the time limit.
     ///
     /// # Errors
-    /// Invalid settings or records ([`Error`] names them), a start that cannot be simulated, a checkpoint that cannot
-    /// be read.
+    /// Invalid settings or records ([`Error`] names them), a start that cannot be simulated and that stages do not lead to where it can, a
+    /// checkpoint that cannot be read.
     pub fn run(self) -> Result<M::Estimate, Error> {
         let begin = std::time::Instant::now();
         let model = self.model.lent();
