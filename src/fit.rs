@@ -14,6 +14,7 @@ mod run;
 mod search;
 mod simulate;
 mod simulated;
+mod staged;
 mod stages;
 mod start_error;
 mod starts;

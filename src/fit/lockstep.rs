@@ -1,8 +1,9 @@
 //! Fits of single records in lockstep: one evaluation of all of them is one pass over lanes.
 
-use super::elsewhere::{Further, led_by, with_work_of};
+use super::elsewhere::{Further, with_work_of};
 use super::refine::{Attempt, Start};
 use super::search::{Rounds, at_end, ended, settled};
+use super::staged::led_by;
 use crate::covariance::SearchEnd;
 use crate::error::Error;
 use crate::estimate::Summary;

@@ -1,9 +1,10 @@
 //! Running a problem: search, estimate at a given point, objective, prediction, states.
 
-use super::elsewhere::{led_by, with_work_of};
+use super::elsewhere::with_work_of;
 use super::predict::asked;
 use super::refine::{Attempt, Start};
 use super::search::{at_end, search, settled};
+use super::staged::led_by;
 use super::start_error::start_error;
 use super::starts::search_from_many;
 use crate::covariance::SearchEnd;

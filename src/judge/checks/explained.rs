@@ -10,7 +10,7 @@ pub(crate) const UNEXPLAINED: Check = Check::new(
     "the model explains its outputs",
     "Is the sum of squares smaller than that about the mean of the output, by Fisher's test with as many \
      measurements as are independent?",
-    &[WarningCode::Unexplained],
+    &[WarningCode::Unexplained, WarningCode::Staged],
     |evidence, _| unexplained(evidence).into(),
 )
 .levels(&[
