@@ -201,9 +201,8 @@ impl<'a, M: Made> Fit<'a, M> {
     /// found.
     ///
     /// Unless set, a fit searches from the declared start. If it is not usable and the model leaves one of the
-    /// outputs unexplained ([`WarningCode::Unexplained`](crate::WarningCode::Unexplained)), it goes on in [stages](Fit::staged) by itself, and
-    /// where these explain nothing either, it searches from 32 starts, after
-    /// 150 evaluations of each from the best four only, and says so; with `starts(1)` it does neither, nor the latter with more than 20,000 samples
+    /// outputs unexplained ([`WarningCode::Unexplained`](crate::WarningCode::Unexplained)), it goes on to search from 32 starts by itself, after
+    /// 150 evaluations of each from the best four only, and says so; with `starts(1)` it does not, nor with more than 20,000 samples
     /// (2,000 where the model does not run in vector registers).
     ///
     /// The first start is the declared one. The others are a Latin hypercube (McKay, Beckman and Conover, Technometrics 21
@@ -241,8 +240,8 @@ impl<'a, M: Made> Fit<'a, M> {
     /// stage before; the last is one from which a simulation follows the measurements. Predictions with a short memory depend almost linearly
     /// on the parameters, where a simulation would leave the measurements, diverge, or end in one of many minima.
     ///
-    /// Without it, a fit does so by itself where the declared start cannot be simulated, or where the search from there leaves an output
-    /// unexplained; after `starts(1)` it does not. A fit that was asked for stages searches from no further starts by itself. A start that the
+    /// Without it, a fit does so by itself where the declared start cannot be simulated; after `starts(1)` it does not. A fit that was asked for
+    /// stages searches from no further starts by itself. A start that the
     /// stages bring no nearer to the measurements stays as it is. Stages need a model that can be read as a graph, of one to six states, an
     /// integrator of fixed steps, a simulation to be predicted ([`FreeRun`](crate::FreeRun), the default), and no pre-filter; the estimate says
     /// what came of them ([`WarningCode::Staged`](crate::WarningCode::Staged)). Their evaluations are counted, their trial steps (100 each at most)
@@ -307,7 +306,7 @@ impl<'a, M: Made> Fit<'a, M> {
     ///
     /// A search that does not converge is an outcome of the estimate, not an error. Where samples leave open at which of two
     /// frequencies the model oscillates ([`WarningCode::Aliased`](crate::WarningCode::Aliased)), further searches begin at the other
-    /// one; where an output is left unexplained, they go on in [stages](Fit::staged), or begin at further [`starts`](Fit::starts). Each has the
+    /// one; where an output is left unexplained, they begin at further [`starts`](Fit::starts). Each has the
     /// trial steps that the first one left of its limit, or a few times those it took; all of them end within the time limit.
     ///
     /// # Errors

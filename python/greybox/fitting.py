@@ -89,7 +89,7 @@ def fit(
         Search from so many starts within the bounds.
     staged : bool, optional
         Lead each start to the data in stages before the search, by filters that correct the state at each sample, from stage to stage less: for
-        starts from which a simulation diverges, and for chaotic or unstable plants. A fit does so by itself where a search explains nothing.
+        starts from which a simulation diverges, and for chaotic or unstable plants. A fit does so by itself where its start cannot be simulated.
     time_limit : float, optional
         Stop at the best point so far after this time (s).
     checkpoint : path, optional

@@ -2,7 +2,6 @@
 //! half the frequency of sampling, and from further starts where an output is left unexplained.
 
 use super::refine::{Start, is_only_coarse, is_useless};
-use super::staged::went;
 use crate::estimate::{About, Summary, Warning, WarningCode};
 use crate::numeral::counted;
 use crate::problem::{Control, Noise, Problem, SearchPlan, Settings};
@@ -41,29 +40,10 @@ impl Trials {
     }
 }
 
-/// How further searches began.
-#[derive(Clone, Copy)]
-pub(super) enum Way {
-    /// At where so many stages led the declared start.
-    Stages(u32),
-    /// At further starts.
-    Starts,
-}
-
-impl Way {
-    fn said(self) -> String {
-        match self {
-            Way::Stages(count) => went(count),
-            Way::Starts => format!("searched from {STARTS} starts by itself, and went on from the best of them"),
-        }
-    }
-}
-
 /// What searches from further starts found.
 pub(super) enum Further {
     Found {
         best: Box<Summary>,
-        way: Way,
         /// Whether limits of the fit stopped searches before their end.
         stopped: bool,
         time: Duration,
@@ -84,11 +64,11 @@ impl Further {
     /// The better one of the best minimum and an estimate that has the work of these searches, with a note.
     fn or(&self, found: &Summary) -> Summary {
         let (mut best, text) = match self {
-            Further::Found { best, way, stopped, .. } => (
+            Further::Found { best, stopped, .. } => (
                 if is_better(best, found) { work_of(found, (**best).clone()) } else { found.clone() },
                 format!(
-                    "the search from the declared start ended where an output is left unexplained, so that the fit {}{}",
-                    way.said(),
+                    "the search from the declared start ended where an output is left unexplained, so that the fit searched from \
+                     {STARTS} starts by itself, and went on from the best of them{}",
                     if *stopped { "; limits of the fit stopped searches before their end" } else { "" }
                 ),
             ),
@@ -157,7 +137,7 @@ impl Problem<'_> {
     }
 
     /// Searches from further starts where an estimate leaves an output unexplained. They run by the default method; the best minimum goes
-    /// on by finer ones where only the step is wrong with it. `None` where a number of starts was asked for, where the measurements tell
+    /// on by finer ones where only the step is wrong with it. `None` where stages or a number of starts were asked for, where the measurements tell
     /// nothing by any parameters, and where the variance is predicted: that likelihood has no bound at noise levels of zero, which some
     /// start would find.
     pub(super) fn search_further(&self, found: &Summary, control: &Control) -> Option<Further> {
@@ -173,17 +153,11 @@ impl Problem<'_> {
             return None;
         }
         let trials = Trials::of(FROM_A_START, found.iterations, self.settings.optimizer.most())?.most;
-        let begin = Instant::now();
-        let been_there = found.warnings.iter().any(|warning| warning.code == WarningCode::Staged);
-        let staged = if been_there { None } else { self.run_in_stages(trials, begin, control) };
-        if let Some((best, stages)) = staged.filter(|(best, _)| !leaves_unexplained(best)) {
-            let (best, way) = (Box::new(best), Way::Stages(stages));
-            return Some(Further::Found { best, way, stopped: control.stops(), time: begin.elapsed() });
-        }
         let most = if self.runs_in_lanes() { LONGEST_IN_LANES } else { LONGEST };
         if self.samples() > most {
             return Some(Further::TooLong(most));
         }
+        let begin = Instant::now();
         let settings = Settings { checkpoint: None, searches: SearchPlan::Best(STARTS), ..self.settings.clone() };
         let problem = Problem { settings, finer: None, ..self.clone() };
         let start = Start { trials, ..Start::declared(&problem) };
@@ -191,12 +165,7 @@ impl Problem<'_> {
         if is_only_coarse(&again) {
             again = self.refined(Ok(again), 0, begin, control).ok()?;
         }
-        Some(Further::Found {
-            best: Box::new(again),
-            way: Way::Starts,
-            stopped: control.stops(),
-            time: begin.elapsed(),
-        })
+        Some(Further::Found { best: Box::new(again), stopped: control.stops(), time: begin.elapsed() })
     }
 
     /// Whether several pieces of records like the first one run together in vector registers.
