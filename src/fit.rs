@@ -252,7 +252,7 @@ impl<'a, M: Made> Fit<'a, M> {
     /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
     /// # let model = Surface::new(4)?;
     /// # let record = Experiment::from_file(&model, "examples/data/pmsm.csv")?;
-    /// let start = Winding { rs: free(60.0), ls: free(1e-4), ke: free(-9.0) }; // truth: 0.63 ohm, 4 mH, 0.95 V s/rad
+    /// let start = Winding { rs: free(6.0), ls: free(4e-2), ke: free(-9.0) }; // truth: 0.63 ohm, 4 mH, 0.95 V s/rad
     /// let estimate = Fit::new(&model, &record).parameters(start).staged().run()?;
     /// assert!((estimate.parameters.ls / 4e-3 - 1.0).abs() < 0.01);
     /// # Ok(())
