@@ -151,8 +151,6 @@ pub(super) fn fit_together(problems: &[Problem<'_>]) -> Vec<Result<Summary, Erro
         })
     };
     let found: Vec<_> = by_one_method(&all, &control).into_iter().zip(&all).map(told).collect();
-    let failed = each(found.len(), |i| problems[i].in_stages_of(found[i].as_ref().err()?, &control));
-    let found: Vec<_> = found.into_iter().zip(failed).map(|(found, staged)| staged.map_or(found, Ok)).collect();
     let further = each(found.len(), |i| problems[i].search_further(found[i].as_ref().ok()?, &control));
     let found = found.into_iter().zip(&further);
     let found: Vec<_> =
@@ -197,6 +195,8 @@ pub(super) fn fit_together(problems: &[Problem<'_>]) -> Vec<Result<Summary, Erro
     }
     let answer = |(attempt, usable): (Attempt, Option<Summary>)| usable.map_or_else(|| attempt.answer(), Ok);
     let found: Vec<Result<Summary, Error>> = attempts.into_iter().zip(usable).map(answer).collect();
+    let failed = each(found.len(), |i| problems[i].in_stages_of(found[i].as_ref().err()?, &control));
+    let found: Vec<_> = found.into_iter().zip(failed).map(|(found, staged)| staged.map_or(found, Ok)).collect();
     let searched =
         each(found.len(), |i| problems[i].searched_elsewhere(found[i].as_ref().ok()?, further[i].as_ref(), &control));
     found.into_iter().zip(searched).map(|(found, searched)| searched.map_or(found, Ok)).collect()

@@ -35,13 +35,12 @@ impl Problem<'_> {
     pub(super) fn run_since(&self, begin: Instant) -> Result<Summary, Error> {
         let control = self.control(begin);
         let found = self.run_first(begin, &control);
-        let found = self.or_in_stages(found, &control);
         // Before finer methods, each of which takes several times as long.
         let further = found.as_ref().ok().and_then(|found| self.search_further(found, &control));
         let found = found.map(|found| with_work_of(found, further.as_ref()));
         let found = match further.as_ref().zip(found.as_ref().ok()).and_then(|(further, found)| further.usable(found)) {
             Some(usable) => usable,
-            None => self.refined(found, 0, begin, &control)?,
+            None => self.or_in_stages(self.refined(found, 0, begin, &control), &control)?,
         };
         Ok(self.searched_elsewhere(&found, further.as_ref(), &control).unwrap_or(found))
     }
