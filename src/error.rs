@@ -279,7 +279,7 @@ pub enum Error {
         /// The real part of an eigenvalue of a continuous plant, about; of a discrete one, the logarithm of its magnitude.
         rate: f64,
         /// Unit of the time in which it grows.
-        per: &'static str,
+        per: String,
     },
     /// States that were asked for by a predictor other than a Kalman filter.
     #[error(

@@ -235,17 +235,18 @@ impl<'a, M: Made> Fit<'a, M> {
         self.set(|settings| settings.searches = SearchPlan::All(count))
     }
 
-    /// Leads each start to the data in stages before the search. Each stage minimizes the errors of predictions by a filter that corrects the
-    /// state at each sample ([`GivenNoise`](crate::predict::GivenNoise)), and that forgets measurements four times more slowly than that of the
-    /// stage before; the last is one from which a simulation follows the measurements. Predictions with a short memory depend almost linearly
-    /// on the parameters, where a simulation would leave the measurements, diverge, or end in one of many minima.
+    /// Improves each start by a continuation before the search: a sequence of fits (stages) of one-step predictions by an extended filter
+    /// ([`GivenNoise`](crate::predict::GivenNoise)), each from the estimate of the one before. The filter corrects the state at each sample, in the
+    /// first stage so much that the influence of a measurement decays within a small part of the time in which the outputs change, in each
+    /// further one four times more slowly. The last stage is the first one after which a simulation follows the measurements as well. Predictions
+    /// with a short memory are nearly linear in the parameters, where a simulation would leave the measurements, diverge, or end in one of
+    /// many minima.
     ///
-    /// Without it, a fit does so by itself where the declared start cannot be simulated; after `starts(1)` it does not. A fit that was asked for
-    /// stages searches from no further starts by itself. A start that the
-    /// stages bring no nearer to the measurements stays as it is. Stages need a model that can be read as a graph, of one to six states, an
-    /// integrator of fixed steps, a simulation to be predicted ([`FreeRun`](crate::FreeRun), the default), and no pre-filter; the estimate says
-    /// what came of them ([`WarningCode::Staged`](crate::WarningCode::Staged)). Their evaluations are counted, their trial steps (100 each at most)
-    /// are not.
+    /// Without it, a fit does so by itself where the declared start cannot be simulated by any of its methods; after `starts(1)` it does not. A
+    /// fit that was asked for stages searches from no further starts by itself. A start is kept where a simulation from the end of its stages is
+    /// no nearer to the measurements. Stages need a model that can be read as a graph, of one to six states, an integrator of fixed steps, a
+    /// simulation to be predicted ([`FreeRun`](crate::FreeRun), the default), and no pre-filter; the estimate says what came of them
+    /// ([`WarningCode::Staged`](crate::WarningCode::Staged)). Their evaluations are counted, their trial steps (100 each at most) are not.
     ///
     /// ```
     /// # use greybox::{Experiment, Fit, free, pmsm::{Surface, Winding}};

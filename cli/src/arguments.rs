@@ -167,7 +167,7 @@ pub struct FitOptions {
     /// Search from so many starts.
     #[arg(long, value_name = "COUNT")]
     pub starts: Option<usize>,
-    /// Lead each start to the data in stages before the search.
+    /// Improve each start in stages before the search: fits of predictions that are corrected less in each stage.
     #[arg(long)]
     pub staged: bool,
     /// End after so many seconds with the best so far.

@@ -88,8 +88,9 @@ def fit(
     starts : int, optional
         Search from so many starts within the bounds.
     staged : bool, optional
-        Lead each start to the data in stages before the search, by filters that correct the state at each sample, from stage to stage less: for
-        starts from which a simulation diverges, and for chaotic or unstable plants. A fit does so by itself where its start cannot be simulated.
+        Improve each start in stages before the search, by fits of predictions of a filter that corrects the state at each sample, in each further
+        stage less: for starts from which a simulation diverges, and for chaotic or unstable plants. A fit does so by itself where its start cannot
+        be simulated.
     time_limit : float, optional
         Stop at the best point so far after this time (s).
     checkpoint : path, optional

@@ -117,8 +117,8 @@ pub enum WarningCode {
     Outliers,
     /// An initial state that neither the user nor the outputs give a start for.
     GuessedStart,
-    /// The search began where stages led a start that cannot be simulated, or from where a simulation loses the measurements
-    /// ([`Fit::staged`](crate::Fit::staged)).
+    /// The search began at the end of stages ([`Fit::staged`](crate::Fit::staged)), which were asked for, or taken since the declared start
+    /// cannot be simulated; or why it did not.
     Staged,
     /// Time jumps within a record.
     TimeGaps,

@@ -3,7 +3,7 @@
 use super::elsewhere::{Further, with_work_of};
 use super::refine::{Attempt, Start};
 use super::search::{Rounds, at_end, ended, settled};
-use super::staged::led_by;
+use super::staged::{after_stages, noted};
 use crate::covariance::SearchEnd;
 use crate::error::Error;
 use crate::estimate::Summary;
@@ -136,21 +136,11 @@ impl<'p> Search<'p> {
 /// fit of each alone.
 pub(super) fn fit_together(problems: &[Problem<'_>]) -> Vec<Result<Summary, Error>> {
     let Some(control) = problems.first().map(|first| control(first, problems.len())) else { return vec![] };
-    let starts = each(problems.len(), |i| problems[i].first_start(&control));
+    let (starts, notes): (Vec<_>, Vec<_>) =
+        each(problems.len(), |i| problems[i].first_start(&control)).into_iter().unzip();
     let all: Vec<From<'_>> = problems.iter().zip(starts).collect();
-    let told = |(found, (problem, start)): (Result<Summary, Error>, &From<'_>)| {
-        let led = start.stages;
-        found.map(|found| {
-            problem.told_of_stages(
-                match led {
-                    Some(led) => led_by(found, led),
-                    None => found,
-                },
-                led,
-            )
-        })
-    };
-    let found: Vec<_> = by_one_method(&all, &control).into_iter().zip(&all).map(told).collect();
+    let found = by_one_method(&all, &control).into_iter().zip(notes);
+    let found: Vec<_> = found.map(|(found, note)| found.map(|found| noted(found, note))).collect();
     let further = each(found.len(), |i| problems[i].search_further(found[i].as_ref().ok()?, &control));
     let found = found.into_iter().zip(&further);
     let found: Vec<_> =
@@ -195,7 +185,7 @@ pub(super) fn fit_together(problems: &[Problem<'_>]) -> Vec<Result<Summary, Erro
     }
     let answer = |(attempt, usable): (Attempt, Option<Summary>)| usable.map_or_else(|| attempt.answer(), Ok);
     let found: Vec<Result<Summary, Error>> = attempts.into_iter().zip(usable).map(answer).collect();
-    let failed = each(found.len(), |i| problems[i].in_stages_of(found[i].as_ref().err()?, &control));
+    let failed = each(found.len(), |i| problems[i].in_stages(found[i].as_ref().err()?, &control));
     let found: Vec<_> = found.into_iter().zip(failed).map(|(found, staged)| staged.map_or(found, Ok)).collect();
     let searched =
         each(found.len(), |i| problems[i].searched_elsewhere(found[i].as_ref().ok()?, further[i].as_ref(), &control));
@@ -286,10 +276,13 @@ fn conclude_together(
     let mut residuals = residuals_together(&points.collect::<Vec<_>>()).into_iter();
     let seconds = begin.elapsed().as_secs_f64() / plain.len() as f64;
     let finish = |i: usize| match (&stages[i], &objectives[i]) {
-        (Stage::Ended(end), Some(objective)) => match residuals.next().flatten() {
-            Some(residuals) => conclude_from(objective, end, residuals, seconds),
-            None => conclude(objective, end, seconds),
-        },
+        (Stage::Ended(end), Some(objective)) => {
+            let found = match residuals.next().flatten() {
+                Some(residuals) => conclude_from(objective, end, residuals, seconds),
+                None => conclude(objective, end, seconds),
+            };
+            found.map(|found| after_stages(found, starts[i].stages))
+        }
         _ => plain[i].problem.run_within(Instant::now(), control, starts[i].clone()),
     };
     (0..plain.len()).map(finish).collect()

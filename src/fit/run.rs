@@ -4,7 +4,7 @@ use super::elsewhere::with_work_of;
 use super::predict::asked;
 use super::refine::{Attempt, Start};
 use super::search::{at_end, search, settled};
-use super::staged::led_by;
+use super::staged::{after_stages, noted};
 use super::start_error::start_error;
 use super::starts::search_from_many;
 use crate::covariance::SearchEnd;
@@ -12,7 +12,7 @@ use crate::error::Error;
 use crate::estimate::Summary;
 use crate::judge::conclude;
 use crate::optimize::{Domain, LeastSquares, LevenbergMarquardt, Outcome};
-use crate::problem::{Control, Objective, Problem, Simulated, Whitening, noise};
+use crate::problem::{Control, Objective, Problem, SearchPlan, Settings, Simulated, Whitening, noise};
 use crate::record::Record;
 use crate::sweep::States;
 use std::time::Instant;
@@ -45,25 +45,20 @@ impl Problem<'_> {
         Ok(self.searched_elsewhere(&found, further.as_ref(), &control).unwrap_or(found))
     }
 
-    /// The estimate from the declared start, or from where stages led it if they were asked for.
+    /// The estimate from the declared start, or from the end of stages if they were asked for.
     fn run_first(&self, begin: Instant, control: &Control) -> Result<Summary, Error> {
-        let start = self.first_start(control);
-        let led = start.stages;
-        let found = if led.is_some() && control.stops() {
-            // Where the stages were stopped is the best point so far.
-            let found = self.run_within(begin, &NEVER, Start { trials: 1, ..start })?;
-            Summary { outcome: control.named(Outcome::Cancelled), ..found }
-        } else {
-            self.run_within(begin, control, start)?
+        let (start, note) = self.first_start(control);
+        let found = match self.run_within(begin, control, start.clone()) {
+            // Stages that were stopped leave no time to evaluate their end, which is the best point so far.
+            Err(_) if self.settings.staged && control.stops() => {
+                let settings = Settings { searches: SearchPlan::Single, ..self.settings.clone() };
+                let problem = Problem { settings, ..self.clone() };
+                let found = problem.run_within(begin, &NEVER, Start { trials: 1, ..start })?;
+                Summary { outcome: control.named(Outcome::Cancelled), ..found }
+            }
+            found => found?,
         };
-        Ok(self.told_of_stages(found, led))
-    }
-
-    /// Where the search begins.
-    pub(super) fn first_start(&self, control: &Control) -> Start {
-        let single = self.settings.staged && self.settings.searches.count() == 1;
-        let stages = if single { self.stages().ok() } else { None };
-        stages.and_then(|stages| stages.declared(control)).unwrap_or_else(|| Start::declared(self))
+        Ok(noted(found, note))
     }
 
     /// The estimate by a method, numbered as in [`by_method`](Self::by_method), or by a finer one, as long as a finer step would
@@ -102,10 +97,7 @@ impl Problem<'_> {
         };
         let end = settled(&plain, end);
         let found = conclude(&at_end(&plain, &end), &end, begin.elapsed().as_secs_f64())?;
-        Ok(match start.stages {
-            Some(led) => led_by(found, led),
-            None => found,
-        })
+        Ok(after_stages(found, start.stages))
     }
 
     /// The stop conditions of a run that began then: flag and time limit.

@@ -1,9 +1,9 @@
-//! Starts that are led to the data in stages: predictions by a filter that corrects the state at each sample, from stage to stage less, until a
-//! simulation follows the measurements.
+//! A continuation from predictions to a simulation, for far starts: a sequence of fits (stages) of one-step predictions by an extended filter,
+//! each from the estimate of the one before, with smaller corrections of the state at each sample, until a simulation follows the measurements.
 //!
-//! How far a filter corrects is told by its memory: the time after which it has forgotten a measurement. Errors of the parameters act no
-//! longer than that, so that with a short memory the predictions depend on them almost linearly; the longer it is, the better do the data
-//! determine them, and the less does the noise of the measurements bias them.
+//! The size of the corrections is given by the filter's memory, the time after which the influence of a measurement on the state has decayed. An
+//! error of the parameters accumulates over that time only: with a short memory the predictions are nearly linear in the parameters. With a long
+//! one the parameters have smaller variances, and less bias by the noise of the measurements.
 
 use super::refine::Start;
 use super::search::search;
@@ -26,7 +26,7 @@ const TRIALS: u64 = 100;
 const FOLLOWS: f64 = 1.5;
 /// Predictions do not explain an output where their error is above this part of half the range. A longer memory does so still less.
 const UNEXPLAINED: f64 = 0.5;
-/// The root of the covariance has the square of so many entries.
+/// With more states the program of a stage takes seconds to compile: its carry has `n + n^2` numbers.
 const MOST_STATES: usize = 6;
 
 /// The stages of a problem.
@@ -39,7 +39,7 @@ pub(super) struct Stages<'p> {
     rate: f64,
 }
 
-/// Stages that led a start.
+/// What the stages from a start did.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Led {
     pub stages: u32,
@@ -105,11 +105,11 @@ impl Problem<'_> {
     }
 }
 
-/// How an output moves, by its measured samples in all records.
+/// Range, noise and rate of change of an output, from its measured samples in all records.
 struct Moves {
     /// Half its range, in its unit.
     half: f64,
-    /// Its noise, from second differences, which what moves slowly hardly changes; at least a small part of `half`.
+    /// Standard deviation of its noise, from second differences, in which slow changes nearly cancel; at least a small part of `half`.
     noise: f64,
     /// It changes by `half` in the time `1 / rate` (1/s); 0 where it does not move.
     rate: f64,
@@ -153,8 +153,8 @@ impl Moves {
 }
 
 impl Stages<'_> {
-    /// The problem of a stage: predictions by a filter that forgets measurements after this time (s). A walk with increments of `part` times its
-    /// noise, each interval, is forgotten after `1 / part` intervals.
+    /// The problem of a stage with this memory (s). The steady gain of a random walk whose increments are `part` times the noise of its measurements
+    /// is about `part`, so that the influence of a measurement decays in `1 / part` intervals.
     fn problem(&self, memory: f64) -> Option<Problem<'_>> {
         let problem = self.problem;
         let scales = problem.scales(problem.records.first()?, self.rate.max(memory.recip()))?;
@@ -179,7 +179,8 @@ impl Stages<'_> {
         Problem::new(sweep, problem.records.clone(), parameters, settings).ok()
     }
 
-    /// The memory of the first stage (s): so short that the outputs change little, and that predictions from a start are near the measurements.
+    /// The memory of the first stage (s): the longest one, in steps of four, in which the outputs change by a small part of their range, and with which
+    /// predictions from the start are near the measurements; else a part of an interval.
     fn first_memory(&self, start: &[f64], control: &Control) -> f64 {
         let least = FIRST_MEMORY * self.step;
         let mut memory = (FIRST_MEMORY / self.rate).max(least);
@@ -194,8 +195,9 @@ impl Stages<'_> {
         memory
     }
 
-    /// Where stages lead a start: to where a simulation follows the measurements as well as the predictions do, or through all stages that explain
-    /// them; `None` where a stage fails, or where a simulation is no nearer to the measurements than from the start.
+    /// The end of the stages from a start. The last stage is the first one after which a simulation follows the measurements as well as the predictions
+    /// do, or one that does not explain them. `None` where a stage fails, or where a simulation from the end is no nearer to the measurements
+    /// than one from the start.
     pub fn lead(&self, start: &[f64], control: &Control) -> Option<(Vec<f64>, Led)> {
         let mut memory = self.first_memory(start, control);
         let (mut coordinates, mut led) = (start.to_vec(), Led::default());
@@ -231,11 +233,11 @@ impl Stages<'_> {
         nearer.then_some((coordinates, led))
     }
 
-    /// The start to which stages lead the declared one.
-    pub fn declared(&self, control: &Control) -> Option<Start> {
+    /// The end of stages from the declared start.
+    pub fn declared(&self, control: &Control) -> Option<(Start, Led)> {
         let declared = Start::declared(self.problem);
         let (coordinates, led) = self.lead(&declared.coordinates, control)?;
-        Some(Start { coordinates, stages: Some(led), ..declared })
+        Some((Start { coordinates, stages: Some(led), ..declared }, led))
     }
 }
 

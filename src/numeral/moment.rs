@@ -52,7 +52,7 @@ impl TimeUnit {
     }
 
     /// The name of the model's own unit of time.
-    fn base(&self) -> &str {
+    pub(crate) fn base(&self) -> &str {
         if self.size == 1.0 { &self.name } else { "s" }
     }
 

@@ -10,13 +10,27 @@ use serde::{Deserialize, Serialize};
 /// The extended filter ([`Kalman`](super::Kalman)) with levels of noise that are given as numbers, in place of the model's: each interval adds
 /// independent errors to the states.
 ///
-/// Errors of the state that are large against the noise of the outputs lead it to the measurements at each sample, so that predictions stay
-/// near them whatever the parameters, and the cost has few minima; the estimate is then biased by the noise of the measurements. A fit from a
-/// far start lowers them in stages ([`Fit::staged`](crate::Fit::staged)).
+/// With errors of the states that are large against the noise of the outputs, the gain is near one: predictions are near the measurements for
+/// any parameters, and the cost has few minima, but the noise of the measurements biases the estimate. A fit from a far start begins so, and
+/// lowers the errors in stages ([`Fit::staged`](crate::Fit::staged)).
 ///
-/// The covariance of the state is the square of a root `S`, which follows the slopes of the model, and is corrected by Potter's formula (R. H.
-/// Battin, *Astronautical Guidance*, 1964, section 9.5) where an output is measured: it stays positive where steps of the integrator are too long
-/// for the model.
+/// The filter carries a root `S` of the state's covariance `P = S S'`: `dS/dt = A S` with the slopes `A` of the model at the state, rotations
+/// (Givens) where an interval adds its errors, and J. E. Potter's formula (R. H. Battin, *Astronautical Guidance*, 1964, section 9.5) where an
+/// output is measured. `P` is then positive semidefinite also where the steps of the integrator are too long for the model.
+///
+/// ```
+/// # use greybox::{Experiment, Fit, free, pmsm::{Surface, Winding}};
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// # let model = Surface::new(4)?;
+/// # let record = Experiment::from_file(&model, "examples/data/pmsm.csv")?;
+/// # let start = Winding { rs: free(1.0), ls: free(2e-3), ke: free(0.7) };
+/// use greybox::predict::GivenNoise;
+/// let noise = GivenNoise { states: vec![0.01, 0.01], outputs: vec![0.05, 0.05] }; // A: each interval, each measurement
+/// let estimate = Fit::new(&model, &record).parameters(start).predictor(noise).run()?;
+/// assert!((estimate.parameters.ls / 4e-3 - 1.0).abs() < 0.02);
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct GivenNoise {
@@ -54,7 +68,7 @@ impl GivenNoise {
             added[i * n + i] = S::from(*error);
         }
         for i in 0..n {
-            // First with the column whose entry is positive, so that no length is zero.
+            // The first rotation is with the column whose entry is positive, so that no length is zero.
             let columns =
                 std::iter::once((false, i)).chain((0..i).map(|j| (false, j))).chain((i + 1..n).map(|j| (true, j)));
             for (is_root, j) in columns {

@@ -134,18 +134,24 @@ impl Unknowns {
         let (start, layout) = (self.start(), sweep.layout());
         for (e, record) in records.iter().enumerate() {
             let Values { x, p } = self.of_experiment(e, &start);
-            sweep.start(record, &x, &p).map_err(|unstable| self.not_stationary(layout, e, unstable))?;
+            sweep.start(record, &x, &p).map_err(|unstable| self.not_stationary(layout, record, e, unstable))?;
         }
         Ok(())
     }
 
     /// The error of an experiment whose plant is unstable where the predictor needs one that is not.
-    pub fn not_stationary(&self, layout: &Layout, e: usize, Unstable { state, rate }: Unstable) -> Error {
+    pub fn not_stationary(
+        &self,
+        layout: &Layout,
+        record: &Record,
+        e: usize,
+        Unstable { state, rate }: Unstable,
+    ) -> Error {
         Error::NotStationary {
             experiment: self.labels[e].clone(),
             state: layout.states.get(state).map_or_else(String::new, |state| state.name.clone()),
             rate,
-            per: if layout.kind == Kind::Discrete { "sample" } else { "s" },
+            per: if layout.kind == Kind::Discrete { "sample" } else { record.time_unit().base() }.to_owned(),
         }
     }
 

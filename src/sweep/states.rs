@@ -17,7 +17,8 @@ pub struct States {
     pub names: Vec<String>,
     /// The mean of each state, a column each.
     pub means: Vec<Vec<f64>>,
-    /// The standard deviation of each state, a column each.
+    /// The standard deviation of each state, a column each. One that measurements after the sample lower to less than `sqrt(n 2e-16)` of that by the
+    /// measurements before it, `n` states, is shown as that much: a difference of variances has no more digits.
     pub deviations: Vec<Vec<f64>>,
     /// The covariance at each sample, row by row, in products of the units of the states.
     pub covariances: Vec<Vec<f64>>,
@@ -137,7 +138,7 @@ fn smooth(layout: &Layout, visited: &[Visited]) -> States {
         let moved = turned(n, &p, &gradient, 1);
         let taken = symmetric(n, &p, &curvature);
         let mean = x.iter().zip(moved).map(|(x, moved)| x - moved).collect();
-        // What the difference of two numbers leaves is no smaller than their rounding.
+        // A variance is no smaller than the rounding of the difference.
         let left = |(at, (p, taken)): (usize, (&f64, f64))| match at % (n + 1) {
             0 => (p - taken).max(n as f64 * f64::EPSILON * p),
             _ => p - taken,

@@ -175,5 +175,54 @@ fn bands_hold_the_truth() {
         // Four deviations.
         assert!((inside / all - 0.95).abs() < 0.033, "{}", inside / all);
     }
+    // Measured: 10 % smaller; each covariance is compared with the exact one above.
     assert!(spread[1] < 0.9 * spread[0], "{spread:?}");
+}
+
+signals! { pub struct Level { x: "m" } }
+signals! { pub struct Levels { r: "m" } }
+
+/// A level that stays as it is, and of which nothing is known before its measurements: to a thousand kilometers.
+#[derive(Clone)]
+struct Still;
+
+impl Model for Still {
+    type State = Level;
+    type Input = Nothing;
+    type Output = Level;
+    type Parameters = Levels;
+    const KIND: Kind = Kind::Discrete;
+
+    fn next<S: Scalar>(&self, _t: S, x: &Level<S>, _u: &Nothing, _p: &Levels<S>) -> Level<S> {
+        *x
+    }
+
+    fn output<S: Scalar>(&self, _t: S, x: &Level<S>, _u: &Nothing, _p: &Levels<S>) -> Level<S> {
+        *x
+    }
+
+    fn initial_noise<S: Scalar>(&self, _p: &Levels<S>) -> Level<S> {
+        Level { x: S::from(1e6) }
+    }
+
+    fn noise<S: Scalar>(&self, p: &Levels<S>) -> Level<S> {
+        Level { x: p.r }
+    }
+}
+
+/// Before the first measurement, the variance of 1e12 that the later ones lower to 1e-6 / 9 leaves no digit of the difference: the deviation is then
+/// that of rounding, 1e6 sqrt(2^-52), and not zero. After it, the filter's own variance has its digits.
+#[test]
+fn a_deviation_is_not_rounded_to_zero() {
+    let outputs: Vec<Level> =
+        (0..10).map(|k| Level { x: if k == 0 { f64::NAN } else { 5.0 + 1e-3 * f64::from(k % 2) } }).collect();
+    let time = Time::Uniform { start: 0.0, step: 1.0 };
+    let record = Experiment::new(&Still, time, vec![Nothing; 10], outputs).unwrap().initial(Level { x: fixed(0.0) });
+    let fit = || Fit::new(&Still, &record).parameters(Levels { r: free(2e-3).log() }).predictor(Kalman);
+    let estimate = fit().run().unwrap();
+    let (r, smoothed) = (estimate.parameters.r, fit().smoothed(&estimate, &record).unwrap());
+    let deviation = |k: usize| smoothed.deviations[k].x;
+    assert!((deviation(0) - 1e6 * f64::EPSILON.sqrt()).abs() < 1e-6, "{}", deviation(0));
+    // Of nine measurements, but for the roundings of a variance of 1e12 that the first one lowers.
+    assert!((deviation(5) / (r / 3.0) - 1.0).abs() < 1e-3, "{} {r}", deviation(5));
 }

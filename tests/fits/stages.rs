@@ -1,7 +1,11 @@
 //! Fits that go from a far start in stages ([`Fit::staged`]).
 
 use crate::common::Noise;
+use greybox::optimize::Outcome;
 use greybox::*;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+use std::time::Duration;
 
 signals! { pub struct Flow { x: "1", y: "1", z: "1" } }
 signals! { pub struct First { x: "1" } }
@@ -143,24 +147,40 @@ fn the_path_is_told() {
         let told = found.warnings.iter().filter(|warning| warning.code == WarningCode::Staged);
         told.map(|warning| warning.text.clone()).collect::<Vec<_>>().join("; ")
     };
-    assert!(said(&fit().run().unwrap()).contains("led the declared start"));
+    assert!(said(&fit().run().unwrap()).contains("the search began at the end of"));
     let filtered = fit().prefilter(Butterworth::low_pass(2, 20.0, 0.005).unwrap()).run().unwrap();
     assert!(said(&filtered).contains("there are none: the errors are filtered"), "{filtered}");
     let adaptive = fit().integrator(Rk45::default()).run().unwrap();
     assert!(said(&adaptive).contains("the integrator chooses its steps"), "{adaptive}");
 }
 
-/// A time limit that ends the stages leaves the best point so far.
+/// A time limit or a flag that ends the stages leaves a point, of one start and of several: not an error, and not a minimum.
 #[test]
-fn a_time_limit_in_the_stages_leaves_a_point() {
+fn a_stop_in_the_stages_leaves_a_point() {
     let record = lorenz();
     let start = Constants { sigma: free(30.0), rho: free(11.0), beta: free(1.3) };
-    let fit = Fit::new(&Lorenz, &record).parameters(start).staged();
-    let found = fit.time_limit(std::time::Duration::from_millis(1)).run();
-    match found {
-        Ok(found) => assert!(!found.outcome.converged() && found.parameters.sigma.is_finite(), "{found}"),
-        // Nothing was evaluated by then, as without stages.
-        Err(error) => assert!(error.to_string().contains("time limit"), "{error}"),
+    let fit = |starts: usize| Fit::new(&Lorenz, &record).parameters(start).starts(starts).staged();
+    for starts in [1, 3] {
+        let late = fit(starts).time_limit(Duration::from_millis(1)).run().unwrap();
+        assert!(matches!(late.outcome, Outcome::TimeLimit { .. }), "{late}");
+        let flagged = fit(starts).cancel(Arc::new(AtomicBool::new(true))).run().unwrap();
+        assert_eq!(flagged.outcome, Outcome::Cancelled, "{flagged}");
+    }
+}
+
+/// A fleet in which each record goes in stages gives what single fits give, the evaluations of the stages among them.
+#[test]
+fn a_fleet_goes_in_stages_as_single_fits_do() {
+    let records = [pushed(1e-3), pushed(2e-3)];
+    let start = Axis { m: free(20.0), fv: free(20.0), offset: free(10.0) };
+    let alone = records.each_ref().map(|record| Fit::new(&Pushed, record).parameters(start).staged().run().unwrap());
+    let fleet = Fleet::new(&Pushed).parameters(start).staged().fleet().unwrap();
+    for (alone, together) in alone.iter().zip(fleet.run(records)) {
+        let together = together.unwrap();
+        assert_eq!(together.evaluations, alone.evaluations);
+        // Lanes add in another order.
+        assert!((together.parameters.m / alone.parameters.m - 1.0).abs() < 1e-6);
+        assert!(together.warnings.iter().any(|warning| warning.code == WarningCode::Staged));
     }
 }
 
