@@ -61,7 +61,9 @@ impl Accumulate for Moments<'_> {
         self.errors.clear();
         for j in 0..outputs {
             let clipped = |error: f64| self.clip.map_or(error, |sigma| huber.psi(error / sigma[j]) * sigma[j]);
-            self.errors.extend(window.errors(j, lane).map(clipped));
+            // In the unit of the output, also where they were divided by predicted deviations.
+            let unit = |k: usize| if window.has_variances() { window.variance_root(k, j, lane) } else { 1.0 };
+            self.errors.extend(window.errors(j, lane).enumerate().map(|(k, error)| clipped(error * unit(k))));
         }
         let of = |j: usize| &self.errors[j * samples..][..samples];
         let weighted = self.objective.is_weighted();
@@ -288,8 +290,9 @@ fn magnitudes(objective: &Objective<'_>) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::predict::GivenNoise;
     use crate::tests::{Current, Gain, Line, Voltage};
-    use crate::{Experiment, Fit, Time, free};
+    use crate::{Experiment, Fit, Kind, Model, Scalar, Time, free};
 
     /// Errors are reproduced to a part of 1e-12 of the largest measurement of all records, and are rounding to 1e-15.
     #[test]
@@ -313,6 +316,55 @@ mod tests {
         };
         // Errors of about 1e-13 and 1e-11 of the largest.
         assert!(level([2.0; 3]) && level([2.0 + 2e-13; 3]) && !level([2.0 + 2e-11; 3]) && !of(1.0, 0.0).1);
+    }
+
+    /// `i[k+1] = a i[k] + u[k]`.
+    #[derive(Clone)]
+    struct Sum;
+
+    impl Model for Sum {
+        type State = Current;
+        type Input = Voltage;
+        type Output = Current;
+        type Parameters = Gain;
+        const KIND: Kind = Kind::Discrete;
+
+        fn next<S: Scalar>(&self, _t: S, x: &Current<S>, u: &Voltage<S>, p: &Gain<S>) -> Current<S> {
+            Current { i: p.a * x.i + u.u }
+        }
+
+        fn output<S: Scalar>(&self, _t: S, x: &Current<S>, _u: &Voltage<S>, _p: &Gain<S>) -> Current<S> {
+            *x
+        }
+    }
+
+    /// Also where the search divides errors by predicted deviations. The gain of a filter depends on the ratio of its two levels of noise only: the
+    /// errors of a filter by hand, whatever the levels are.
+    #[test]
+    fn errors_are_in_the_unit_of_the_output() {
+        let (inputs, outputs) = ([1.0, -2.0, 3.0, 0.5, 1.0, -1.0], [0.0, 1.5, -1.0, 2.0, 3.0, 2.0]);
+        let record = Experiment::new(
+            &Sum,
+            Time::Uniform { start: 0.0, step: 1.0 },
+            inputs.map(|u| Voltage { u }).to_vec(),
+            outputs.map(|i| Current { i }).to_vec(),
+        );
+        let records = [record.unwrap()];
+        let (mut x, mut variance, mut sum) = (0.0, 0.0, 0.0);
+        for (u, y) in inputs.into_iter().zip(outputs) {
+            let (error, gain) = (y - x, variance / (variance + 1.0));
+            sum += error * error;
+            x = 0.8 * (x + gain * error) + u;
+            variance = 0.64 * (1.0 - gain) * variance + 4.0;
+        }
+        for level in [1e-3, 1.0, 1e3] {
+            let noise = GivenNoise { states: vec![2.0 * level], outputs: vec![level] };
+            let problem =
+                Fit::new(&Sum, &records).parameters(Gain { a: free(0.8) }).predictor(noise).problem().unwrap();
+            let found = errors(&problem.objective().unwrap(), &problem.unknowns.start()).unwrap();
+            // Six samples of a few operations each.
+            assert!((found[0] / (sum / 6.0_f64).sqrt() - 1.0).abs() < 1e-13, "{found:?} {sum}");
+        }
     }
 
     /// The mean of `min(|z|, c)^2` over the standard normal density, by the trapezoidal rule: its error is that of the kinks at

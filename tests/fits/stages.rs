@@ -147,7 +147,8 @@ fn the_path_is_told() {
         let told = found.warnings.iter().filter(|warning| warning.code == WarningCode::Staged);
         told.map(|warning| warning.text.clone()).collect::<Vec<_>>().join("; ")
     };
-    assert!(said(&fit().run().unwrap()).contains("the search began at the end of"));
+    let found = fit().run().unwrap();
+    assert!(said(&found).contains("the search began at the end of"), "{found}");
     let filtered = fit().prefilter(Butterworth::low_pass(2, 20.0, 0.005).unwrap()).run().unwrap();
     assert!(said(&filtered).contains("there are none: the errors are filtered"), "{filtered}");
     let adaptive = fit().integrator(Rk45::default()).run().unwrap();
@@ -162,7 +163,7 @@ fn a_stop_in_the_stages_leaves_a_point() {
     let fit = |starts: usize| Fit::new(&Lorenz, &record).parameters(start).starts(starts).staged();
     for starts in [1, 3] {
         let late = fit(starts).time_limit(Duration::from_millis(1)).run().unwrap();
-        assert!(matches!(late.outcome, Outcome::TimeLimit { .. }), "{late}");
+        assert!(matches!(late.outcome, Outcome::TimeLimit), "{late}");
         let flagged = fit(starts).cancel(Arc::new(AtomicBool::new(true))).run().unwrap();
         assert_eq!(flagged.outcome, Outcome::Cancelled, "{flagged}");
     }
