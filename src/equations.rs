@@ -80,7 +80,7 @@ impl Equations {
     /// The same with process noise, measurement noise, noise of the initial state and dead times.
     ///
     /// # Errors
-    /// If they do not fit the layout, or one of the four depends on more than parameters.
+    /// If they do not fit the layout, or a noise of the initial state or a dead time depends on more than parameters.
     pub fn complete(layout: Layout, graph: &Graph, roots: &Roots) -> Result<Self, InvalidEquations> {
         layout.check()?;
         roots.check(&layout)?;
@@ -138,9 +138,9 @@ impl Equations {
             M::Output::into_array(model.output(t, &x, &u, &p)).as_ref().to_vec()
         })?;
         let levels = graph.trace(|| {
-            let p = leaves().3;
-            let diffusion = M::State::into_array(model.diffusion(&p));
-            let noise = M::Output::into_array(model.noise(&p));
+            let (t, x, u, p) = leaves();
+            let diffusion = M::State::into_array(model.diffusion(t, &x, &u, &p));
+            let noise = M::Output::into_array(model.noise(t, &x, &u, &p));
             let initial = M::State::into_array(model.initial_noise(&p));
             let delay = M::Input::into_array(model.delay(&p));
             [diffusion.as_ref(), noise.as_ref(), initial.as_ref(), delay.as_ref()].concat()
@@ -148,7 +148,7 @@ impl Equations {
         Equations::traced(layout, &graph, [&state, &output, &levels])
     }
 
-    /// The equations of roots that were read: states, outputs, and what depends on parameters alone.
+    /// The equations of roots that were read: states, outputs, and levels of noise and dead times.
     fn traced(layout: Layout, graph: &Graph, [state, output, levels]: [&[Id]; 3]) -> Result<Self, Untraceable> {
         let mut levels = levels.iter().copied();
         // Noise that is not in the file is zero.
@@ -241,14 +241,14 @@ impl<S: Scalar> Functions<S> for Equations {
         self.values(&self.roots.output, Some((t, x, u)), p, to);
     }
 
-    fn diffusion(&self, p: &[S], to: &mut [S]) {
+    fn diffusion(&self, t: S, x: &[S], u: &[S], p: &[S], to: &mut [S]) {
         to.fill(S::from(0.0));
-        self.values(&self.roots.diffusion, None, p, to);
+        self.values(&self.roots.diffusion, Some((t, x, u)), p, to);
     }
 
-    fn noise(&self, p: &[S], to: &mut [S]) {
+    fn noise(&self, t: S, x: &[S], u: &[S], p: &[S], to: &mut [S]) {
         to.fill(S::from(f64::NAN));
-        self.values(&self.roots.noise, None, p, to);
+        self.values(&self.roots.noise, Some((t, x, u)), p, to);
     }
 
     fn initial_noise(&self, p: &[S], to: &mut [S]) {

@@ -17,10 +17,10 @@ pub trait Functions<S>: Send + Sync {
     fn output(&self, t: S, x: &[S], u: &[S], p: &[S], to: &mut [S]);
 
     /// Process noise of each state, as [`Model::diffusion`].
-    fn diffusion(&self, p: &[S], to: &mut [S]);
+    fn diffusion(&self, t: S, x: &[S], u: &[S], p: &[S], to: &mut [S]);
 
     /// Measurement noise of each output, as [`Model::noise`].
-    fn noise(&self, p: &[S], to: &mut [S]);
+    fn noise(&self, t: S, x: &[S], u: &[S], p: &[S], to: &mut [S]);
 
     /// Standard deviation of each state at the first sample, as [`Model::initial_noise`].
     fn initial_noise(&self, p: &[S], to: &mut [S]);
@@ -154,14 +154,14 @@ impl<M: Model, S: Scalar> Functions<S> for Handle<'_, M> {
         to.copy_from_slice(M::Output::into_array(Model::output(&**self, t, &x, &u, &p)).as_ref());
     }
 
-    fn diffusion(&self, p: &[S], to: &mut [S]) {
-        let p = M::Parameters::from_fn(|i| p[i]);
-        to.copy_from_slice(M::State::into_array(Model::diffusion(&**self, &p)).as_ref());
+    fn diffusion(&self, t: S, x: &[S], u: &[S], p: &[S], to: &mut [S]) {
+        let (x, u, p) = (M::State::from_fn(|i| x[i]), M::Input::from_fn(|i| u[i]), M::Parameters::from_fn(|i| p[i]));
+        to.copy_from_slice(M::State::into_array(Model::diffusion(&**self, t, &x, &u, &p)).as_ref());
     }
 
-    fn noise(&self, p: &[S], to: &mut [S]) {
-        let p = M::Parameters::from_fn(|i| p[i]);
-        to.copy_from_slice(M::Output::into_array(Model::noise(&**self, &p)).as_ref());
+    fn noise(&self, t: S, x: &[S], u: &[S], p: &[S], to: &mut [S]) {
+        let (x, u, p) = (M::State::from_fn(|i| x[i]), M::Input::from_fn(|i| u[i]), M::Parameters::from_fn(|i| p[i]));
+        to.copy_from_slice(M::Output::into_array(Model::noise(&**self, t, &x, &u, &p)).as_ref());
     }
 
     fn initial_noise(&self, p: &[S], to: &mut [S]) {

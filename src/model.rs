@@ -77,18 +77,31 @@ pub trait Model: Send + Sync {
         Self::State::splat(S::from(f64::NAN))
     }
 
-    /// Process noise: of a continuous model the standard deviation of each state's disturbance over one second of white
+    /// Process noise at time `t` (s): of a continuous model the standard deviation of each state's disturbance over one second of white
     /// noise (unit of the state per square root of a second), of a discrete model that of what is added at each step. Zero
-    /// unless written. Predictors that filter use it ([`Kalman`](crate::Kalman)); a simulation does not.
+    /// unless written. Predictors that filter use it ([`Kalman`](crate::Kalman)), at the state that they expect; a simulation does not.
     #[inline]
-    fn diffusion<S: Scalar>(&self, _p: &Of<Self::Parameters, S>) -> Of<Self::State, S> {
+    fn diffusion<S: Scalar>(
+        &self,
+        _t: S,
+        _x: &Of<Self::State, S>,
+        _u: &Of<Self::Input, S>,
+        _p: &Of<Self::Parameters, S>,
+    ) -> Of<Self::State, S> {
         Self::State::splat(S::from(0.0))
     }
 
-    /// Standard deviation of the measurement noise of each output, in its unit, for predictors that filter. Left
+    /// Standard deviation of the measurement noise of each output at time `t` (s), in its unit, for predictors that filter, which ask for it at the
+    /// state that they expect. It may be a part of the output, or an input: a column of the record with the deviation of each sample. Left
     /// unwritten, it is not a number, which such a predictor refuses.
     #[inline]
-    fn noise<S: Scalar>(&self, _p: &Of<Self::Parameters, S>) -> Of<Self::Output, S> {
+    fn noise<S: Scalar>(
+        &self,
+        _t: S,
+        _x: &Of<Self::State, S>,
+        _u: &Of<Self::Input, S>,
+        _p: &Of<Self::Parameters, S>,
+    ) -> Of<Self::Output, S> {
         Self::Output::splat(S::from(f64::NAN))
     }
 

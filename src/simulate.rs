@@ -95,7 +95,7 @@ impl<'a, M: Model, I: Integrator> Simulator<'a, M, I> {
     /// #     type Parameters = Rates;
     /// #     fn derivative<S: Scalar>(&self, _t: S, x: &Level<S>, _u: &Nothing, p: &Rates<S>) -> Level<S> { Level { x: -(p.a * x.x) } }
     /// #     fn output<S: Scalar>(&self, _t: S, x: &Level<S>, _u: &Nothing, _p: &Rates<S>) -> Level<S> { *x }
-    /// #     fn diffusion<S: Scalar>(&self, p: &Rates<S>) -> Level<S> { Level { x: p.q } }
+    /// #     fn diffusion<S: Scalar>(&self, _t: S, _x: &Level<S>, _u: &Nothing, p: &Rates<S>) -> Level<S> { Level { x: p.q } }
     /// # }
     /// let (truth, time) = (Rates { a: 0.5, q: 0.2 }, Time::Uniform { start: 0.0, step: 1.0 });
     /// let run = Simulator::new(&Drift).disturbed(7).run(&truth, &Level { x: 0.0 }, time, &[Nothing; 2000])?;

@@ -30,8 +30,8 @@ class Model:
     ``derivative(t, x, u, p)`` the derivative of each state; of a model in continuous time
     ``next(t, x, u, p)``       the next value of each state; of a model in discrete time
     ``output(t, x, u, p)``     each output; may be left out where all outputs are states
-    ``diffusion(p)``           the intensity of the process noise of each state, for a Kalman predictor
-    ``noise(p)``               the standard deviation of the noise of each output, for a Kalman predictor
+    ``diffusion(t, x, u, p)``  the intensity of the process noise of each state, for a Kalman predictor
+    ``noise(t, x, u, p)``      the standard deviation of the noise of each output, for a Kalman predictor
     ``initial_noise(p)``       the standard deviation of each state at the first sample, for a Kalman predictor
     ``delay(p)``               the dead time of each input (s)
     ========================== =======================================================================
@@ -81,13 +81,13 @@ class Model:
             raise Error(f"{type(self).__name__}: output `{missing[0]}` is no state; write the method output(self, t, x, u, p)")
         return [x[name] for name in names]
 
-    def diffusion(self, p: Vector) -> Returned:
+    def diffusion(self, t: Symbol, x: Vector, u: Vector, p: Vector) -> Returned:
         """Give the intensity of the process noise of each state."""
-        raise NotImplementedError(f"{type(self).__name__} has no method diffusion(self, p)")
+        raise NotImplementedError(f"{type(self).__name__} has no method diffusion(self, t, x, u, p)")
 
-    def noise(self, p: Vector) -> Returned:
+    def noise(self, t: Symbol, x: Vector, u: Vector, p: Vector) -> Returned:
         """Give the standard deviation of the noise of each output."""
-        raise NotImplementedError(f"{type(self).__name__} has no method noise(self, p)")
+        raise NotImplementedError(f"{type(self).__name__} has no method noise(self, t, x, u, p)")
 
     def initial_noise(self, p: Vector) -> Returned:
         """Give the standard deviation of each state at the first sample."""
@@ -185,9 +185,9 @@ def model(
 
     Parameters
     ----------
-    derivative, next, output : callable, optional
+    derivative, next, output, diffusion, noise : callable, optional
         As the methods of :class:`Model`, without ``self``.
-    diffusion, noise, initial_noise, delay : callable, optional
+    initial_noise, delay : callable, optional
         The same, of ``p`` alone.
     states, inputs, outputs, parameters : Signals, mapping from names to units, or names
         The quantities.
@@ -273,7 +273,8 @@ def _roots(
 
     x, u, p = vector("states", graph.state), vector("inputs", graph.input), vector("parameters", graph.parameter)
     output = _written(of, "output") or (lambda *args: Model.output(of, *args))
-    roles = {"diffusion": "states", "noise": "outputs", "initial_noise": "states", "delay": "inputs"}
+    levels = {"diffusion": "states", "noise": "outputs"}
+    constant = {"initial_noise": "states", "delay": "inputs"}
 
     def nodes(role: str, function: Callable[..., Returned] | None, name: str, *args: Any) -> list[_core.Node]:
         if function is None:
@@ -289,7 +290,8 @@ def _roots(
     return [
         nodes("states", state, name, t, x, u, p),
         nodes("outputs", output, "output", t, x, u, p),
-        *(nodes(role, _written(of, name), name, p) for name, role in roles.items()),
+        *(nodes(role, _written(of, name), name, t, x, u, p) for name, role in levels.items()),
+        *(nodes(role, _written(of, name), name, p) for name, role in constant.items()),
     ]
 
 

@@ -59,8 +59,8 @@ def test_states() -> None:
     level = np.cumsum(0.1 * rng.normal(size=300))
     frame = pd.DataFrame({"t": np.arange(300.0), "y": level + 0.3 * rng.normal(size=300)})
     model = gb.model(
-        next=lambda t, x, u, p: [x.level], output=lambda t, x, u, p: [x.level], diffusion=lambda p: [p.q], noise=lambda p: [p.r],
-        initial_noise=lambda p: [1.0], states=["level"], outputs=["y"], parameters=["q", "r"],
+        next=lambda t, x, u, p: [x.level], output=lambda t, x, u, p: [x.level], diffusion=lambda t, x, u, p: [p.q],
+        noise=lambda t, x, u, p: [p.r], initial_noise=lambda p: [1.0], states=["level"], outputs=["y"], parameters=["q", "r"],
     )
     start = {"q": gb.free(0.2, log=True), "r": gb.free(0.2, log=True)}
     found = gb.fit(model, frame, parameters=start, time="t", initial={"level": gb.fixed(0.0)}, predictor="kalman")
@@ -158,3 +158,18 @@ def test_plots(fitted: gb.Fit, tmp_path: Path) -> None:
     assert [axis.get_ylabel() for axis in fitted.plot().axes] == ["id (A)", "iq (A)", "ud (V)", "uq (V)", "w (rad/s)"]
     two = gb.fit(cooling(), [gb.Record(cooled(), name="a"), gb.Record(cooled(seed=2), name="b")], k=gb.free(1.0))
     assert len(two.plot().axes[0].lines) == 4
+
+
+def test_levels_that_move() -> None:
+    """A column of deviations weights the samples: the weighted least squares in closed form."""
+    rng = np.random.default_rng(4)
+    u = np.arange(1.0, 121.0)
+    deviation = np.where(np.arange(120) % 4 == 0, 0.1, 5.0)
+    frame = pd.DataFrame({"t": u, "u": u, "s": deviation, "y": 3.0 * u + deviation * rng.normal(size=120)})
+    model = gb.model(
+        output=lambda t, x, u, p: [p.a * u.u], noise=lambda t, x, u, p: [u.s], inputs=["u", "s"], outputs=["y"], parameters=["a"],
+    )
+    found = gb.fit(model, frame, parameters={"a": gb.free(1.0)}, time="t", predictor="kalman")
+    weights = u / deviation**2
+    assert found.parameters.a == pytest.approx((weights * frame["y"]).sum() / (weights * u).sum(), rel=1e-12)
+    assert found.standard_errors.a == pytest.approx((weights * u).sum() ** -0.5, rel=1e-6)

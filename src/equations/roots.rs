@@ -4,8 +4,8 @@ use super::InvalidEquations;
 use crate::graph::Id;
 use crate::layout::{Kind, Layout};
 
-/// The nodes of a graph that make up [`Equations`](super::Equations). Lists other than the first two may be left empty, and depend on parameters
-/// alone.
+/// The nodes of a graph that make up [`Equations`](super::Equations). Lists other than the first two may be left empty; the last two depend on
+/// parameters alone.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Roots {
     /// The derivative of each state (continuous) or its next value (discrete); empty for a static model.
@@ -23,19 +23,19 @@ pub struct Roots {
 }
 
 impl Roots {
-    /// Those that may depend on states, inputs and time.
+    /// The derivatives (next states) and the outputs.
     pub(super) fn moving(&self) -> Vec<Id> {
         [&*self.state, &self.output].concat()
     }
 
     /// Those that depend on parameters alone.
     pub(super) fn constant(&self) -> Vec<Id> {
-        [&*self.diffusion, &self.noise, &self.initial_noise, &self.delay].concat()
+        [&*self.initial_noise, &self.delay].concat()
     }
 
     /// All, in the order of the fields.
     pub(crate) fn all(&self) -> Vec<Id> {
-        [self.moving(), self.constant()].concat()
+        [self.moving(), self.diffusion.clone(), self.noise.clone(), self.constant()].concat()
     }
 
     /// Roots of these counts, from a list of all of them in the order of the fields.

@@ -39,7 +39,7 @@ fn expected<O: Order, S: Scalar>(plant: &dyn Plant<S>, carry: &[S], output: usiz
     let times = |i: usize| (0..n).map(|j| covariance[entry(n, i, j)] * c[j]).sum::<S>();
     let gain: Vec<S> = (0..n).map(times).collect();
     let mut noise = vec![S::from(0.0); outputs];
-    plant.noise(&mut noise);
+    plant.noise(&carry[..n], &mut noise);
     let noise = noise[output] * noise[output];
     let noise = spread.get(entry(outputs, output, output)).map_or(noise, |spread| noise + *spread);
     let variance = gain.iter().zip(&c).map(|(g, c)| *g * *c).sum::<S>() + noise;
@@ -70,12 +70,14 @@ fn correct<O: Order, S: Scalar>(plant: &dyn Plant<S>, carry: &mut [S], output: u
 
 fn advance<O: Order, S: Scalar>(plant: &dyn Plant<S>, carry: &mut [S]) -> Result<(), Stuck> {
     let n = plant.layout().states.len();
-    let mut noise = vec![S::from(0.0); n];
-    plant.diffusion(&mut noise);
-    let with_noise = |i: usize, j: usize, moved: S| if i == j { moved + noise[i] * noise[i] } else { moved };
+    let noise_at = |position: f64, x: &[S]| {
+        let mut noise = vec![S::from(0.0); n];
+        plant.diffusion(position, &x[..n], &mut noise);
+        move |i: usize, j: usize, moved: S| if i == j { moved + noise[i] * noise[i] } else { moved }
+    };
     if plant.layout().kind == Kind::Discrete {
         let Moments { mean, slopes: a, spread } = O::state(plant, 0.0, carry);
-        let before = carry[n..].to_vec();
+        let (before, with_noise) = (carry[n..].to_vec(), noise_at(0.0, carry));
         carry[..n].copy_from_slice(&mean);
         for i in 0..n {
             for j in i..n {
@@ -87,10 +89,14 @@ fn advance<O: Order, S: Scalar>(plant: &dyn Plant<S>, carry: &mut [S]) -> Result
         }
         return Ok(());
     }
+    if n == 0 {
+        return Ok(());
+    }
     // dx/dt = E f, dP/dt = A P + P A' + Q with A = E df/dx: the covariance of x and f(x) is P A' where x is Gaussian (C. Stein).
     plant.integrate(carry, &|position, z, to| {
         let Moments { mean, slopes: a, .. } = O::state(plant, position, z);
         to[..n].copy_from_slice(&mean);
+        let with_noise = noise_at(position, z);
         let flow = |i: usize, j: usize| (0..n).map(|k| a[i * n + k] * z[n + entry(n, k, j)]).sum::<S>();
         for i in 0..n {
             for j in i..n {
@@ -129,13 +135,9 @@ impl<F: Filter> Predictor for F {
         true
     }
 
-    fn check(&self, layout: &Layout) -> Result<(), Error> {
-        match layout.kind {
-            Kind::Static => {
-                Err(Error::Option("a static model has no state to filter; leave the predictor out".to_owned()))
-            }
-            Kind::Continuous | Kind::Discrete => Ok(()),
-        }
+    /// Any model: of a static one, outputs are predicted with the variance of their noise.
+    fn check(&self, _layout: &Layout) -> Result<(), Error> {
+        Ok(())
     }
 
     fn starts_from(&self) -> StartsFrom {

@@ -54,7 +54,7 @@ impl InitialCovariance {
         if self == InitialCovariance::Declared {
             return Ok(upper(diagonal(&|to| plant.initial_noise(to))));
         }
-        let q = diagonal(&|to| plant.diffusion(to));
+        let q = diagonal(&|to| plant.diffusion(0.0, x, to));
         if self == InitialCovariance::FirstInterval && kind == Kind::Discrete {
             return Ok(upper(q));
         }

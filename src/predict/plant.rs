@@ -55,11 +55,11 @@ pub trait Plant<S> {
     /// Where the integrator is [`Stuck`].
     fn integrate(&self, z: &mut [S], rate: Rate<'_, S>) -> Result<(), Stuck>;
 
-    /// Process noise of each state, as [`Model::diffusion`](crate::Model::diffusion).
-    fn diffusion(&self, to: &mut [S]);
+    /// Process noise of each state at the fraction `position` of the interval, as [`Model::diffusion`](crate::Model::diffusion).
+    fn diffusion(&self, position: f64, x: &[S], to: &mut [S]);
 
-    /// Measurement noise of each output, as [`Model::noise`](crate::Model::noise).
-    fn noise(&self, to: &mut [S]);
+    /// Measurement noise of each output at the sample, as [`Model::noise`](crate::Model::noise).
+    fn noise(&self, x: &[S], to: &mut [S]);
 
     /// Standard deviation of each state at the first sample, as [`Model::initial_noise`](crate::Model::initial_noise).
     fn initial_noise(&self, to: &mut [S]);
@@ -274,12 +274,13 @@ impl<S: Stepped> Plant<S> for SlicePlant<'_, S> {
         self.cross(Kind::Continuous, z, rate, &slopes)
     }
 
-    fn diffusion(&self, to: &mut [S]) {
-        self.functions.diffusion(self.p, to);
+    fn diffusion(&self, position: f64, x: &[S], to: &mut [S]) {
+        let (t, u) = (self.between.time(position), self.between.input(position));
+        self.functions.diffusion(t, x, &u, self.p, to);
     }
 
-    fn noise(&self, to: &mut [S]) {
-        self.functions.noise(self.p, to);
+    fn noise(&self, x: &[S], to: &mut [S]) {
+        self.functions.noise(self.between.time(0.0), x, &self.between.input(0.0), self.p, to);
     }
 
     fn initial_noise(&self, to: &mut [S]) {

@@ -28,8 +28,8 @@ impl Kalman {
     /// #     const KIND: Kind = Kind::Discrete;
     /// #     fn next<S: Scalar>(&self, _t: S, x: &Level<S>, _u: &Nothing, p: &Levels<S>) -> Level<S> { Level { x: p.a * x.x } }
     /// #     fn output<S: Scalar>(&self, _t: S, x: &Level<S>, _u: &Nothing, _p: &Levels<S>) -> Level<S> { *x }
-    /// #     fn diffusion<S: Scalar>(&self, p: &Levels<S>) -> Level<S> { Level { x: p.q } }
-    /// #     fn noise<S: Scalar>(&self, p: &Levels<S>) -> Level<S> { Level { x: p.r } }
+    /// #     fn diffusion<S: Scalar>(&self, _t: S, _x: &Level<S>, _u: &Nothing, p: &Levels<S>) -> Level<S> { Level { x: p.q } }
+    /// #     fn noise<S: Scalar>(&self, _t: S, _x: &Level<S>, _u: &Nothing, p: &Levels<S>) -> Level<S> { Level { x: p.r } }
     /// # }
     /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
     /// # let outputs = (0..50).map(|k| Level { x: f64::from(k * 7 % 11) / 11.0 - 0.5 }).collect();

@@ -104,6 +104,13 @@ impl SymbolicPlant<'_> {
         to.copy_from_slice(&self.interval.at(graph, entries, position, x));
     }
 
+    /// Levels of noise; those that are not written are `unsaid`.
+    fn levels(&self, roots: &[Id], unsaid: f64, position: f64, x: &[Symbol], to: &mut [Symbol]) {
+        to.fill(Symbol::from(unsaid));
+        let found = self.interval.at(self.interval.equations().graph(), roots, position, x);
+        to.iter_mut().zip(found).for_each(|(to, found)| *to = found);
+    }
+
     /// Of the state and of the outputs.
     fn equations_moments(&self) -> &(MomentsOf, MomentsOf) {
         self.moments.get_or_init(|| self.interval.equations().moments())
@@ -162,12 +169,12 @@ impl Plant<Symbol> for SymbolicPlant<'_> {
         Ok(())
     }
 
-    fn diffusion(&self, to: &mut [Symbol]) {
-        self.interval.equations().diffusion(&self.p, to);
+    fn diffusion(&self, position: f64, x: &[Symbol], to: &mut [Symbol]) {
+        self.levels(&self.interval.equations().roots().diffusion, 0.0, position, x, to);
     }
 
-    fn noise(&self, to: &mut [Symbol]) {
-        self.interval.equations().noise(&self.p, to);
+    fn noise(&self, x: &[Symbol], to: &mut [Symbol]) {
+        self.levels(&self.interval.equations().roots().noise, f64::NAN, 0.0, x, to);
     }
 
     fn initial_noise(&self, to: &mut [Symbol]) {

@@ -278,10 +278,10 @@ mod tests {
         fn derivative<S: Scalar>(&self, _t: S, x: &Current<S>, u: &Voltage<S>, p: &Levels<S>) -> Current<S> {
             Current { i: (u.u - x.i) * p.a }
         }
-        fn diffusion<S: Scalar>(&self, p: &Levels<S>) -> Current<S> {
+        fn diffusion<S: Scalar>(&self, _t: S, _x: &Current<S>, _u: &Voltage<S>, p: &Levels<S>) -> Current<S> {
             Current { i: p.drift }
         }
-        fn noise<S: Scalar>(&self, p: &Levels<S>) -> Current<S> {
+        fn noise<S: Scalar>(&self, _t: S, _x: &Current<S>, _u: &Voltage<S>, p: &Levels<S>) -> Current<S> {
             Current { i: p.noise }
         }
         fn output<S: Scalar>(&self, _t: S, x: &Current<S>, _u: &Voltage<S>, _p: &Levels<S>) -> Current<S> {

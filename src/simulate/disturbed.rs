@@ -21,7 +21,7 @@ impl Disturbance {
     }
 
     /// The state at the end of an interval of `h` (s) that begins at another, disturbed by a normal number with the covariance that the
-    /// diffusion leaves over it.
+    /// diffusion at its begin leaves over it.
     pub fn add<M: Model>(
         &mut self,
         system: &ModelSystem<'_, M, f64>,
@@ -32,7 +32,8 @@ impl Disturbance {
         let end = M::State::into_array(*end);
         let end = end.as_ref();
         let n = M::State::LEN;
-        let levels = M::State::into_array(system.model.diffusion(system.p));
+        let (t, u) = (system.interval.t0, system.interval.input(0.0));
+        let levels = M::State::into_array(system.model.diffusion(t, begin, &u, system.p));
         let levels = levels.as_ref();
         let normal: Vec<f64> = self.of_states.iter_mut().map(Random::normal).collect();
         if M::KIND != Kind::Continuous {

@@ -68,8 +68,8 @@ mod tests {
         fn output(&self, _t: f64, x: &[f64], _u: &[f64], _p: &[f64], to: &mut [f64]) {
             to[0] = (self.output)([x[0], x[1]]);
         }
-        fn diffusion(&self, _p: &[f64], _to: &mut [f64]) {}
-        fn noise(&self, _p: &[f64], _to: &mut [f64]) {}
+        fn diffusion(&self, _t: f64, _x: &[f64], _u: &[f64], _p: &[f64], _to: &mut [f64]) {}
+        fn noise(&self, _t: f64, _x: &[f64], _u: &[f64], _p: &[f64], _to: &mut [f64]) {}
         fn initial_noise(&self, _p: &[f64], _to: &mut [f64]) {}
         fn delay(&self, _p: &[f64], _to: &mut [f64]) {}
     }

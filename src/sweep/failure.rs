@@ -151,12 +151,12 @@ impl Functions<f64> for Watched<'_> {
         self.values.output(t, x, u, p, to);
     }
 
-    fn diffusion(&self, p: &[f64], to: &mut [f64]) {
-        self.values.diffusion(p, to);
+    fn diffusion(&self, t: f64, x: &[f64], u: &[f64], p: &[f64], to: &mut [f64]) {
+        self.values.diffusion(t, x, u, p, to);
     }
 
-    fn noise(&self, p: &[f64], to: &mut [f64]) {
-        self.values.noise(p, to);
+    fn noise(&self, t: f64, x: &[f64], u: &[f64], p: &[f64], to: &mut [f64]) {
+        self.values.noise(t, x, u, p, to);
     }
 
     fn initial_noise(&self, p: &[f64], to: &mut [f64]) {

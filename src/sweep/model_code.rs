@@ -131,12 +131,12 @@ impl<S: Scalar> Functions<S> for Evaluated {
         Functions::output(&*self.equations, t, x, u, p, to);
     }
 
-    fn diffusion(&self, p: &[S], to: &mut [S]) {
-        self.equations.diffusion(p, to);
+    fn diffusion(&self, t: S, x: &[S], u: &[S], p: &[S], to: &mut [S]) {
+        self.equations.diffusion(t, x, u, p, to);
     }
 
-    fn noise(&self, p: &[S], to: &mut [S]) {
-        self.equations.noise(p, to);
+    fn noise(&self, t: S, x: &[S], u: &[S], p: &[S], to: &mut [S]) {
+        self.equations.noise(t, x, u, p, to);
     }
 
     fn initial_noise(&self, p: &[S], to: &mut [S]) {

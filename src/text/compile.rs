@@ -20,11 +20,12 @@ pub(super) fn compile(document: &Document, source: &Arc<Source>) -> Result<Equat
     };
     let state = all(document.states.iter().map(|one| &one.rate).collect(), &mut compiler);
     let output = all(document.outputs.iter().map(|one| &one.value).collect(), &mut compiler);
-    let diffusion = compiler.levels(document.states.iter().map(|one| one.diffusion.as_ref()), 0.0, "the diffusion");
-    let noise = compiler.levels(document.outputs.iter().map(|one| one.noise.as_ref()), f64::NAN, "the noise");
+    let diffusion = document.states.iter().map(|one| one.diffusion.as_ref());
+    let diffusion = compiler.levels(diffusion, 0.0, "the diffusion", true);
+    let noise = compiler.levels(document.outputs.iter().map(|one| one.noise.as_ref()), f64::NAN, "the noise", true);
     let initial = document.states.iter().map(|one| one.initial_noise.as_ref());
-    let initial_noise = compiler.levels(initial, 0.0, "the initial noise");
-    let delay = compiler.levels(document.inputs.iter().map(|one| one.delay.as_ref()), 0.0, "the dead time");
+    let initial_noise = compiler.levels(initial, 0.0, "the initial noise", false);
+    let delay = compiler.levels(document.inputs.iter().map(|one| one.delay.as_ref()), 0.0, "the dead time", false);
     if !compiler.errors.is_empty() {
         return Err(compiler.errors);
     }
@@ -104,12 +105,13 @@ impl<'d> Compiler<'d> {
         self.errors.push(remark);
     }
 
-    /// One level for each, where one is given; they depend on parameters and constants only.
+    /// One level for each, where one is given; unless it `may_move`, it depends on parameters and constants only.
     fn levels<'e>(
         &mut self,
         expressions: impl Iterator<Item = Option<&'e Expression>> + Clone,
         unsaid: f64,
         what: &str,
+        may_move: bool,
     ) -> Vec<Id> {
         if expressions.clone().all(|one| one.is_none()) {
             return vec![];
@@ -126,7 +128,7 @@ impl<'d> Compiler<'d> {
             let moves = |node: &crate::graph::Node| {
                 matches!(node, crate::graph::Node::Leaf(Leaf::State(_) | Leaf::Input(_) | Leaf::Time))
             };
-            if nodes.any(|(node, _)| moves(node)) {
+            if !may_move && nodes.any(|(node, _)| moves(node)) {
                 let title =
                     format!("{what} depends on a state, an input or time; it may depend on parameters and constants");
                 self.errors.push(Remark::error(self.source, expression.whole(), title));

@@ -216,21 +216,22 @@ impl Module<'_> {
             document.outputs.iter().map(|one| (one.quantity.name.as_str(), Some(&one.value))).collect();
         self.function(&mut text, ("output", "Output", full), &outputs, "");
         let of_parameters = "_p: &Of<Self::Parameters, S>";
-        let mut levels = |function: &str, role: &str, entries: Vec<(&Declared, Option<&Expression>)>, unsaid: &str| {
-            let entries: Vec<_> = entries.into_iter().map(|(one, level)| (one.name.as_str(), level)).collect();
-            if entries.iter().any(|one| one.1.is_some()) {
-                self.function(&mut text, (function, role, of_parameters), &entries, unsaid);
-            }
-        };
+        let mut levels =
+            |signature: (&str, &str, &str), entries: Vec<(&Declared, Option<&Expression>)>, unsaid: &str| {
+                let entries: Vec<_> = entries.into_iter().map(|(one, level)| (one.name.as_str(), level)).collect();
+                if entries.iter().any(|one| one.1.is_some()) {
+                    self.function(&mut text, signature, &entries, unsaid);
+                }
+            };
         let states = || document.states.iter();
         let diffusion = states().map(|one| (&one.quantity, one.diffusion.as_ref()));
-        levels("diffusion", "State", diffusion.collect(), "S::from(0.0)");
+        levels(("diffusion", "State", full), diffusion.collect(), "S::from(0.0)");
         let noise = document.outputs.iter().map(|one| (&one.quantity, one.noise.as_ref()));
-        levels("noise", "Output", noise.collect(), "S::from(f64::NAN)");
+        levels(("noise", "Output", full), noise.collect(), "S::from(f64::NAN)");
         let initial = states().map(|one| (&one.quantity, one.initial_noise.as_ref()));
-        levels("initial_noise", "State", initial.collect(), "S::from(0.0)");
+        levels(("initial_noise", "State", of_parameters), initial.collect(), "S::from(0.0)");
         let delay = document.inputs.iter().map(|one| (&one.quantity, one.delay.as_ref()));
-        levels("delay", "Input", delay.collect(), "S::from(0.0)");
+        levels(("delay", "Input", of_parameters), delay.collect(), "S::from(0.0)");
         text + "}\n"
     }
 

@@ -27,10 +27,10 @@ impl Model for Drifting {
     fn next<S: Scalar>(&self, _t: S, x: &Level<S>, u: &Drive<S>, p: &Unsteady<S>) -> Level<S> {
         Level { x: p.decay * x.x + u.u }
     }
-    fn diffusion<S: Scalar>(&self, p: &Unsteady<S>) -> Level<S> {
+    fn diffusion<S: Scalar>(&self, _t: S, _x: &Level<S>, _u: &Drive<S>, p: &Unsteady<S>) -> Level<S> {
         Level { x: p.drift }
     }
-    fn noise<S: Scalar>(&self, p: &Unsteady<S>) -> Sensor<S> {
+    fn noise<S: Scalar>(&self, _t: S, _x: &Level<S>, _u: &Drive<S>, p: &Unsteady<S>) -> Sensor<S> {
         Sensor { y: p.noise }
     }
     fn output<S: Scalar>(&self, _t: S, x: &Level<S>, _u: &Drive<S>, _p: &Unsteady<S>) -> Sensor<S> {

@@ -28,10 +28,10 @@ impl Model for Hardening {
     fn output<S: Scalar>(&self, _t: S, x: &Deflection<S>, _u: &Pull<S>, _p: &Spring<S>) -> Gauges<S> {
         Gauges { y: x.x, z: x.x + x.x * x.x * 0.5 }
     }
-    fn diffusion<S: Scalar>(&self, p: &Spring<S>) -> Deflection<S> {
+    fn diffusion<S: Scalar>(&self, _t: S, _x: &Deflection<S>, _u: &Pull<S>, p: &Spring<S>) -> Deflection<S> {
         Deflection { x: p.q }
     }
-    fn noise<S: Scalar>(&self, p: &Spring<S>) -> Gauges<S> {
+    fn noise<S: Scalar>(&self, _t: S, _x: &Deflection<S>, _u: &Pull<S>, p: &Spring<S>) -> Gauges<S> {
         Gauges { y: p.r, z: p.r * 2.0 }
     }
 }

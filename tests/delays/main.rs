@@ -36,10 +36,10 @@ impl Model for Heated {
     fn delay<S: Scalar>(&self, p: &Process<S>) -> Valve<S> {
         Valve { u: p.theta }
     }
-    fn diffusion<S: Scalar>(&self, _p: &Process<S>) -> Excess<S> {
+    fn diffusion<S: Scalar>(&self, _t: S, _x: &Excess<S>, _u: &Valve<S>, _p: &Process<S>) -> Excess<S> {
         Excess { z: S::from(0.01) }
     }
-    fn noise<S: Scalar>(&self, _p: &Process<S>) -> Sensor<S> {
+    fn noise<S: Scalar>(&self, _t: S, _x: &Excess<S>, _u: &Valve<S>, _p: &Process<S>) -> Sensor<S> {
         Sensor { y: S::from(0.1) }
     }
 }

@@ -28,10 +28,10 @@ impl Model for Driven {
     fn delay<S: Scalar>(&self, p: &Spring<S>) -> Two<S> {
         Two { early: S::from(0.0), late: p.theta }
     }
-    fn diffusion<S: Scalar>(&self, p: &Spring<S>) -> Speeds<S> {
+    fn diffusion<S: Scalar>(&self, _t: S, _x: &Speeds<S>, _u: &Two<S>, p: &Spring<S>) -> Speeds<S> {
         Speeds { x: S::from(0.0), v: p.q }
     }
-    fn noise<S: Scalar>(&self, p: &Spring<S>) -> Excess<S> {
+    fn noise<S: Scalar>(&self, _t: S, _x: &Speeds<S>, _u: &Two<S>, p: &Spring<S>) -> Excess<S> {
         Excess { z: p.r }
     }
 }

@@ -29,10 +29,10 @@ impl Model for RandomWalk {
     fn next<S: Scalar>(&self, _t: S, x: &Position<S>, _u: &Push<S>, _p: &Levels<S>) -> Position<S> {
         *x
     }
-    fn diffusion<S: Scalar>(&self, p: &Levels<S>) -> Position<S> {
+    fn diffusion<S: Scalar>(&self, _t: S, _x: &Position<S>, _u: &Push<S>, p: &Levels<S>) -> Position<S> {
         Position { x: p.drift }
     }
-    fn noise<S: Scalar>(&self, p: &Levels<S>) -> Sensors<S> {
+    fn noise<S: Scalar>(&self, _t: S, _x: &Position<S>, _u: &Push<S>, p: &Levels<S>) -> Sensors<S> {
         Sensors { y: p.y, z: p.z }
     }
     fn output<S: Scalar>(&self, _t: S, x: &Position<S>, _u: &Push<S>, _p: &Levels<S>) -> Sensors<S> {
@@ -54,10 +54,10 @@ impl Model for Sampled {
         let a = (-p.tau.recip()).exp();
         Position { x: a * x.x + p.gain * u.u * (-a + 1.0) }
     }
-    fn diffusion<S: Scalar>(&self, p: &Dynamics<S>) -> Position<S> {
+    fn diffusion<S: Scalar>(&self, _t: S, _x: &Position<S>, _u: &Push<S>, p: &Dynamics<S>) -> Position<S> {
         Position { x: p.drift }
     }
-    fn noise<S: Scalar>(&self, p: &Dynamics<S>) -> Sensors<S> {
+    fn noise<S: Scalar>(&self, _t: S, _x: &Position<S>, _u: &Push<S>, p: &Dynamics<S>) -> Sensors<S> {
         Sensors { y: p.y, z: p.z }
     }
     fn output<S: Scalar>(&self, _t: S, x: &Position<S>, _u: &Push<S>, _p: &Dynamics<S>) -> Sensors<S> {
@@ -77,10 +77,10 @@ impl Model for Lag {
     fn derivative<S: Scalar>(&self, _t: S, x: &Position<S>, u: &Push<S>, p: &Dynamics<S>) -> Position<S> {
         Position { x: (p.gain * u.u - x.x) / p.tau }
     }
-    fn diffusion<S: Scalar>(&self, p: &Dynamics<S>) -> Position<S> {
+    fn diffusion<S: Scalar>(&self, _t: S, _x: &Position<S>, _u: &Push<S>, p: &Dynamics<S>) -> Position<S> {
         Position { x: p.drift }
     }
-    fn noise<S: Scalar>(&self, p: &Dynamics<S>) -> Sensors<S> {
+    fn noise<S: Scalar>(&self, _t: S, _x: &Position<S>, _u: &Push<S>, p: &Dynamics<S>) -> Sensors<S> {
         Sensors { y: p.y, z: p.z }
     }
     fn output<S: Scalar>(&self, _t: S, x: &Position<S>, _u: &Push<S>, _p: &Dynamics<S>) -> Sensors<S> {
@@ -480,13 +480,10 @@ fn what_cannot_be_filtered_is_refused() {
         };
         error.to_string()
     }
-    let why = refused(&Noiseless, Position { x: fixed(0.0) });
-    assert!(
-        why.contains("the predicted variance of output `x` is NaN; it must be positive: write Model::noise"),
-        "{why}"
-    );
-    let why = refused(&Stateless, Nothing);
-    assert!(why.contains("no state to filter"), "{why}");
+    for why in [refused(&Noiseless, Position { x: fixed(0.0) }), refused(&Stateless, Nothing)] {
+        let expected = "the predicted variance of output `x` is NaN; it must be positive: write Model::noise";
+        assert!(why.contains(expected), "{why}");
+    }
 }
 
 /// Of 20 errors of size `s` the deviance rises by `20 (ln(s'^2 / s^2) + s^2 / s'^2 - 1)` where the level is `s'`: by the square of

@@ -147,10 +147,10 @@ impl Model for Pendulum {
     fn output<S: Scalar>(&self, _t: S, x: &Swing<S>, _u: &Pull<S>, _p: &Hanging<S>) -> Angle<S> {
         Angle { phi: x.phi }
     }
-    fn diffusion<S: Scalar>(&self, p: &Hanging<S>) -> Swing<S> {
+    fn diffusion<S: Scalar>(&self, _t: S, _x: &Swing<S>, _u: &Pull<S>, p: &Hanging<S>) -> Swing<S> {
         Swing { phi: S::from(0.0), w: p.q }
     }
-    fn noise<S: Scalar>(&self, p: &Hanging<S>) -> Angle<S> {
+    fn noise<S: Scalar>(&self, _t: S, _x: &Swing<S>, _u: &Pull<S>, p: &Hanging<S>) -> Angle<S> {
         Angle { phi: p.r }
     }
 }

@@ -29,12 +29,12 @@ impl Model for Mass {
         Motion { x: x.x + x.v, v: x.v * (-p.d + 1.0) - pull + u.u, w: x.w * 0.7 + x.v * 0.3 }
     }
 
-    fn diffusion<S: Scalar>(&self, _p: &Spring<S>) -> Motion<S> {
+    fn diffusion<S: Scalar>(&self, _t: S, _x: &Motion<S>, _u: &Force<S>, _p: &Spring<S>) -> Motion<S> {
         let [x, v, w] = DIFFUSION.map(S::from);
         Motion { x, v, w }
     }
 
-    fn noise<S: Scalar>(&self, _p: &Spring<S>) -> Gauges<S> {
+    fn noise<S: Scalar>(&self, _t: S, _x: &Motion<S>, _u: &Force<S>, _p: &Spring<S>) -> Gauges<S> {
         let [x, sum] = NOISE.map(S::from);
         Gauges { x, sum }
     }

@@ -133,10 +133,10 @@ impl Model for Coupled {
     fn output<S: Scalar>(&self, _t: S, z: &Pair<S>, _u: &Push<S>, _p: &Rates<S>) -> Pair<S> {
         *z
     }
-    fn diffusion<S: Scalar>(&self, p: &Rates<S>) -> Pair<S> {
+    fn diffusion<S: Scalar>(&self, _t: S, _x: &Pair<S>, _u: &Push<S>, p: &Rates<S>) -> Pair<S> {
         Pair { x: p.q, v: p.q }
     }
-    fn noise<S: Scalar>(&self, p: &Rates<S>) -> Pair<S> {
+    fn noise<S: Scalar>(&self, _t: S, _x: &Pair<S>, _u: &Push<S>, p: &Rates<S>) -> Pair<S> {
         Pair { x: p.r, v: p.r }
     }
 }
@@ -206,10 +206,10 @@ impl Model for Dry {
     fn output<S: Scalar>(&self, _t: S, x: &Speed<S>, _u: &Pull<S>, _p: &Slide<S>) -> Speed<S> {
         *x
     }
-    fn diffusion<S: Scalar>(&self, p: &Slide<S>) -> Speed<S> {
+    fn diffusion<S: Scalar>(&self, _t: S, _x: &Speed<S>, _u: &Pull<S>, p: &Slide<S>) -> Speed<S> {
         Speed { v: p.q }
     }
-    fn noise<S: Scalar>(&self, p: &Slide<S>) -> Speed<S> {
+    fn noise<S: Scalar>(&self, _t: S, _x: &Speed<S>, _u: &Pull<S>, p: &Slide<S>) -> Speed<S> {
         Speed { v: p.r }
     }
 }

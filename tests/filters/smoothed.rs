@@ -205,7 +205,7 @@ impl Model for Still {
         Level { x: S::from(1e6) }
     }
 
-    fn noise<S: Scalar>(&self, p: &Levels<S>) -> Level<S> {
+    fn noise<S: Scalar>(&self, _t: S, _x: &Level<S>, _u: &Nothing, p: &Levels<S>) -> Level<S> {
         Level { x: p.r }
     }
 }

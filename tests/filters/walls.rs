@@ -38,10 +38,10 @@ impl<const DISCRETE: bool> Model for Heated<DISCRETE> {
     fn output<S: Scalar>(&self, _t: S, x: &Walls<S>, _u: &Heat<S>, _p: &Building<S>) -> Probes<S> {
         Probes { y: x.a, z: x.a + x.b }
     }
-    fn diffusion<S: Scalar>(&self, p: &Building<S>) -> Walls<S> {
+    fn diffusion<S: Scalar>(&self, _t: S, _x: &Walls<S>, _u: &Heat<S>, p: &Building<S>) -> Walls<S> {
         Walls { a: p.q, b: p.q * 0.5 }
     }
-    fn noise<S: Scalar>(&self, p: &Building<S>) -> Probes<S> {
+    fn noise<S: Scalar>(&self, _t: S, _x: &Walls<S>, _u: &Heat<S>, p: &Building<S>) -> Probes<S> {
         Probes { y: p.r, z: p.r * 2.0 }
     }
     fn initial_noise<S: Scalar>(&self, p: &Building<S>) -> Walls<S> {

@@ -143,10 +143,10 @@ impl Model for Walk {
     fn next<S: Scalar>(&self, _t: S, x: &Level<S>, u: &Drive<S>, p: &Filtered<S>) -> Level<S> {
         Level { x: p.a * x.x + p.b * u.u }
     }
-    fn diffusion<S: Scalar>(&self, p: &Filtered<S>) -> Level<S> {
+    fn diffusion<S: Scalar>(&self, _t: S, _x: &Level<S>, _u: &Drive<S>, p: &Filtered<S>) -> Level<S> {
         Level { x: p.drift }
     }
-    fn noise<S: Scalar>(&self, p: &Filtered<S>) -> Level<S> {
+    fn noise<S: Scalar>(&self, _t: S, _x: &Level<S>, _u: &Drive<S>, p: &Filtered<S>) -> Level<S> {
         Level { x: p.sensor }
     }
     fn output<S: Scalar>(&self, _t: S, x: &Level<S>, _u: &Drive<S>, _p: &Filtered<S>) -> Level<S> {

@@ -65,6 +65,33 @@ fn a_section_has_dead_times_and_noise() {
     assert!(!table.lines().any(|line| line.starts_with("noise of id")), "{table}");
 }
 
+/// Levels of noise may depend on states, inputs and time, in each form of the model.
+#[test]
+fn levels_that_move() {
+    let text = "greybox = 1\n[parameters]\nq = { start = 0.1 }\n[inputs]\nu = \"V\"\n\
+         [states]\nx = { unit = \"V\", next = \"0.5*x + u\", diffusion = \"q*abs(x) + 0.1*t\" }\n\
+         [outputs]\ny = { value = \"x\", unit = \"V\", noise = \"0.02*y0 + 0.3*u\" }\n[let]\ny0 = \"2*x\"";
+    let levels = |of: &Model| {
+        let roots = [&*of.equations().roots().diffusion, &of.equations().roots().noise].concat();
+        of.equations().graph().evaluate(&roots, |leaf| match leaf {
+            Leaf::State(_) => -3.0,
+            Leaf::Input(_) => 2.0,
+            Leaf::Time => 4.0,
+            _ => 0.7f64,
+        })
+    };
+    let read = model(text);
+    let expected = [0.7 * 3.0 + 0.1 * 4.0, 0.02 * (2.0 * -3.0) + 0.3 * 2.0];
+    assert_eq!(levels(&read), expected);
+    assert_eq!(levels(&Model::of(read.equations(), "model", read.parameters()).unwrap()), expected);
+    // No number that a fit could take as given.
+    assert_eq!(read.noise(), [None]);
+    let code = read.to_rust().unwrap();
+    for signature in ["fn diffusion<S: Scalar>(&self, t: S, x: &", "fn noise<S: Scalar>(&self, _t: S, x: &"] {
+        assert!(code.contains(signature), "{code}");
+    }
+}
+
 /// The value of an expression of `x` (0.7), `y` (-1.3), `p` (2) and the time (3).
 fn value(expression: &str) -> f64 {
     let text = format!(

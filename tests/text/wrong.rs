@@ -43,7 +43,7 @@ const CASES: &[Case] = &[
     ("we*id\", initial = \"first\"", "we*id\", initial = true", "`initial` is true or false, where a number, \"first\", \"estimated\" or a table should stand", (18, 87), ""),
     ("id = \"id\"\niq = {", "[solver]\nids = {", "the model has no outputs; say what is measured", (19, 2), ""),
     ("noise = 0.05", "noise = -0.05", "the noise must be finite and not negative", (21, 42), ""),
-    ("noise = 0.05", "noise = \"0.05*id\"", "the noise depends on a state, an input or time; it may depend on parameters and constants", (21, 42), ""),
+    ("we*id\", initial = \"first\"", "we*id\", initial = \"first\", initial_noise = \"0.1*w\"", "the initial noise depends on a state, an input or time; it may depend on parameters and constants", (18, 112), ""),
     // Names.
     ("ud - rs*id", "ud - Rs*id", "nothing is called `Rs`", (17, 40), "did you mean `rs`?"),
     ("ud - rs*id", "ud - resistance*id", "nothing is called `resistance`", (17, 40), "declare it under [constants], [inputs], [parameters], [states] or [let]"),

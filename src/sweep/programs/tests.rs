@@ -35,10 +35,10 @@ impl Model for Pendulum {
     fn output<S: Scalar>(&self, _t: S, x: &Angle<S>, u: &Torque<S>, _p: &Given<S>) -> Angle<S> {
         Angle { phi: x.phi, w: x.w + u.m * 0.01 }
     }
-    fn diffusion<S: Scalar>(&self, p: &Given<S>) -> Angle<S> {
+    fn diffusion<S: Scalar>(&self, _t: S, _x: &Angle<S>, _u: &Torque<S>, p: &Given<S>) -> Angle<S> {
         Angle { phi: S::from(0.0), w: p.q }
     }
-    fn noise<S: Scalar>(&self, p: &Given<S>) -> Angle<S> {
+    fn noise<S: Scalar>(&self, _t: S, _x: &Angle<S>, _u: &Torque<S>, p: &Given<S>) -> Angle<S> {
         Angle { phi: p.r, w: p.r * 2.0 }
     }
 }

@@ -103,11 +103,11 @@ impl Model for Walk {
         *x
     }
 
-    fn diffusion<S: Scalar>(&self, p: &Levels<S>) -> Position<S> {
+    fn diffusion<S: Scalar>(&self, _t: S, _x: &Position<S>, _u: &Nothing, p: &Levels<S>) -> Position<S> {
         Position { x: p.drift }
     }
 
-    fn noise<S: Scalar>(&self, p: &Levels<S>) -> Position<S> {
+    fn noise<S: Scalar>(&self, _t: S, _x: &Position<S>, _u: &Nothing, p: &Levels<S>) -> Position<S> {
         Position { x: p.noise }
     }
 

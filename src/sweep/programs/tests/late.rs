@@ -33,10 +33,10 @@ macro_rules! driven {
             fn delay<S: Scalar>(&self, p: &Late<S>) -> Forces<S> {
                 Forces { m: p.late, f: p.early, g: p.late }
             }
-            fn diffusion<S: Scalar>(&self, _p: &Late<S>) -> Angle<S> {
+            fn diffusion<S: Scalar>(&self, _t: S, _x: &Angle<S>, _u: &Forces<S>, _p: &Late<S>) -> Angle<S> {
                 Angle { phi: S::from(0.0), w: S::from(0.1) }
             }
-            fn noise<S: Scalar>(&self, p: &Late<S>) -> Angle<S> {
+            fn noise<S: Scalar>(&self, _t: S, _x: &Angle<S>, _u: &Forces<S>, p: &Late<S>) -> Angle<S> {
                 Angle { phi: p.r, w: p.r * 2.0 }
             }
         }
