@@ -15,7 +15,8 @@ use crate::record::{Channel, Record};
 const LEAST_NOISE: f64 = 1e-6;
 /// The memory of the first stage, as a part of the time in which the outputs change by half their range; at least this part of an interval.
 const FIRST_MEMORY: f64 = 0.1;
-/// Predictions from a start are near the measurements where their error is at most so many times the noise. Else the first memory is shorter.
+/// Predictions are near the measurements where their error is at most so many times the noise. If those from the start are not, the first memory is
+/// shorter.
 const NEAR: f64 = 5.0;
 /// How many times longer the memory is from stage to stage, and the most stages: the last memory is 1e9 times the first.
 const LONGER: f64 = 4.0;
@@ -195,26 +196,47 @@ impl Stages<'_> {
         memory
     }
 
-    /// The end of the stages from a start. The last stage is the first one after which a simulation follows the measurements as well as the predictions
-    /// do, or one that does not explain them. `None` where a stage fails, or where a simulation from the end is no nearer to the measurements
+    /// The end of the stages from a start. Where its predictions are not near the measurements, others begin from the start with memories that are
+    /// longer: with a short one, noise hides the parameters. `None` where all fail, or where no simulation from an end is nearer to the measurements
     /// than one from the start.
     pub fn lead(&self, start: &[f64], control: &Control) -> Option<(Vec<f64>, Led)> {
-        let mut memory = self.first_memory(start, control);
-        let (mut coordinates, mut led) = (start.to_vec(), Led::default());
+        let (mut memory, longest) = (self.first_memory(start, control), self.rate.recip());
+        let (mut found, mut nearest): (_, f64) = (None, self.distance(start).unwrap_or(f64::INFINITY));
+        let mut evaluations = 0;
+        loop {
+            let (coordinates, led, near) = self.lead_from(start, memory, control);
+            evaluations += led.evaluations;
+            if let Some(distance) = self.distance(&coordinates).filter(|distance| *distance < nearest) {
+                (found, nearest) = (Some((coordinates, led)), distance);
+            }
+            memory *= LONGER;
+            if near || memory > longest || control.stops() {
+                break;
+            }
+        }
+        found.map(|(coordinates, led)| (coordinates, Led { evaluations, ..led }))
+    }
+
+    /// The end of the stages from a start, of which the first one has this memory (s), and whether its predictions are near the measurements. The
+    /// last stage is the first one after which a simulation follows the measurements as well as the predictions do, one that does not explain them,
+    /// or the one before a stage that fails.
+    fn lead_from(&self, start: &[f64], mut memory: f64, control: &Control) -> (Vec<f64>, Led, bool) {
+        let (mut coordinates, mut led, mut near) = (start.to_vec(), Led::default(), false);
         for stage in 1..=MOST {
             if control.stops() {
                 break;
             }
-            let problem = self.problem(memory)?;
+            let Some(problem) = self.problem(memory) else { break };
             memory *= LONGER;
             let plain = problem.in_units(control);
-            let end = search(&plain, &problem.settings.optimizer, coordinates.clone()).ok()?;
+            let Ok(end) = search(&plain, &problem.settings.optimizer, coordinates.clone()) else { break };
             coordinates = end.coordinates;
             led.stages = stage;
             led.evaluations += end.evaluations;
             let Some(predicted) = errors(&problem, &coordinates, control) else { break };
-            let unexplained = |(error, moves): (&f64, &Moves)| moves.half > 0.0 && *error > UNEXPLAINED * moves.half;
-            if predicted.iter().zip(&self.outputs).any(unexplained) {
+            let parts = || predicted.iter().zip(&self.outputs).filter(|(_, moves)| moves.half > 0.0);
+            near = parts().all(|(error, moves)| *error <= NEAR * moves.noise);
+            if parts().any(|(error, moves)| *error > UNEXPLAINED * moves.half) {
                 break;
             }
             let simulated = errors(self.problem, &coordinates, control);
@@ -224,13 +246,14 @@ impl Stages<'_> {
                 break;
             }
         }
-        let distance = |at: &[f64]| {
-            let errors = errors(self.problem, at, &Control::NEVER)?;
-            let parts = errors.iter().zip(&self.outputs).filter(|(_, moves)| moves.half > 0.0);
-            Some(parts.map(|(error, moves)| (error / moves.half).powi(2)).sum::<f64>())
-        };
-        let nearer = distance(&coordinates).is_some_and(|led| distance(start).is_none_or(|start| led < start));
-        nearer.then_some((coordinates, led))
+        (coordinates, led, near)
+    }
+
+    /// The sum over the outputs of the mean square error of a simulation, in units of half the range; `None` where it cannot be evaluated.
+    fn distance(&self, at: &[f64]) -> Option<f64> {
+        let errors = errors(self.problem, at, &Control::NEVER)?;
+        let parts = errors.iter().zip(&self.outputs).filter(|(_, moves)| moves.half > 0.0);
+        Some(parts.map(|(error, moves)| (error / moves.half).powi(2)).sum::<f64>())
     }
 
     /// The end of stages from the declared start.
