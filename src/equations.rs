@@ -80,7 +80,8 @@ impl Equations {
     /// The same with process noise, measurement noise, noise of the initial state and dead times.
     ///
     /// # Errors
-    /// If they do not fit the layout, or a noise of the initial state or a dead time depends on more than parameters.
+    /// If they do not fit the layout, a noise of the initial state or a dead time depends on more than parameters, or an initial state on more than
+    /// these and inputs.
     pub fn complete(layout: Layout, graph: &Graph, roots: &Roots) -> Result<Self, InvalidEquations> {
         layout.check()?;
         roots.check(&layout)?;
@@ -90,12 +91,12 @@ impl Equations {
         }
         let (graph, all) = graph.pruned(&all);
         let roots = roots.with(&all);
-        let constant = graph.reached(&roots.constant());
-        for (node, constant) in graph.nodes().iter().zip(constant) {
+        let (constant, initial) = (graph.reached(&roots.constant()), graph.reached(&roots.initial));
+        for (node, (constant, initial)) in graph.nodes().iter().zip(constant.into_iter().zip(initial)) {
             let Node::Leaf(leaf) = *node else { continue };
             let there = match leaf {
-                Leaf::Time => !constant,
-                Leaf::State(i) => (i as usize) < layout.states.len() && !constant,
+                Leaf::Time => !constant && !initial,
+                Leaf::State(i) => (i as usize) < layout.states.len() && !constant && !initial,
                 Leaf::Input(i) => (i as usize) < layout.inputs.len() && !constant,
                 Leaf::Parameter(i) => (i as usize) < layout.parameters.len(),
                 Leaf::Step | Leaf::NextInput(_) | Leaf::Measured(_) | Leaf::Late { .. } => false,
@@ -142,8 +143,9 @@ impl Equations {
             let diffusion = M::State::into_array(model.diffusion(t, &x, &u, &p));
             let noise = M::Output::into_array(model.noise(t, &x, &u, &p));
             let initial = M::State::into_array(model.initial_noise(&p));
+            let begin = M::State::into_array(model.initial(&u, &p));
             let delay = M::Input::into_array(model.delay(&p));
-            [diffusion.as_ref(), noise.as_ref(), initial.as_ref(), delay.as_ref()].concat()
+            [diffusion.as_ref(), noise.as_ref(), initial.as_ref(), begin.as_ref(), delay.as_ref()].concat()
         })?;
         Equations::traced(layout, &graph, [&state, &output, &levels])
     }
@@ -164,6 +166,7 @@ impl Equations {
             diffusion: said(layout.states.len(), zero),
             noise: said(layout.outputs.len(), f64::is_nan),
             initial_noise: said(layout.states.len(), zero),
+            initial: said(layout.states.len(), f64::is_nan),
             delay: said(layout.inputs.len(), zero),
         };
         Equations::complete(layout, graph, &roots).map_err(|wrong| Untraceable { reason: wrong.to_string() })
@@ -182,6 +185,15 @@ impl Equations {
     /// The nodes of the graph that make them up.
     pub fn roots(&self) -> &Roots {
         &self.roots
+    }
+
+    /// Which states the model says at the first sample ([`Model::initial`]).
+    pub(crate) fn begins(&self) -> Vec<bool> {
+        let said = |id: &Id| !self.graph.known(*id).is_some_and(f64::is_nan);
+        match self.roots.initial.is_empty() {
+            true => vec![false; self.layout.states.len()],
+            false => self.roots.initial.iter().map(said).collect(),
+        }
     }
 
     /// Whether derivatives and outputs are affine in the states: then so is each step, and slopes do not depend on states.
@@ -203,12 +215,12 @@ impl Equations {
     }
 }
 
-/// The values of a graph's roots at a time, a state and inputs, and at parameters; NaN of what is not given.
+/// The values of a graph's roots at a time, a state and inputs, and at parameters; NaN of what is not given, such as an empty state.
 fn evaluate<S: Scalar>(graph: &Graph, roots: &[Id], at: Option<(S, &[S], &[S])>, p: &[S]) -> Vec<S> {
     graph.evaluate(roots, |leaf| match (leaf, at) {
         (Leaf::Parameter(i), _) => p[i as usize],
         (Leaf::Time, Some((t, ..))) => t,
-        (Leaf::State(i), Some((_, x, _))) => x[i as usize],
+        (Leaf::State(i), Some((_, x, _))) if !x.is_empty() => x[i as usize],
         (Leaf::Input(i), Some((_, _, u))) => u[i as usize],
         _ => S::from(f64::NAN),
     })
@@ -254,6 +266,11 @@ impl<S: Scalar> Functions<S> for Equations {
     fn initial_noise(&self, p: &[S], to: &mut [S]) {
         to.fill(S::from(0.0));
         self.values(&self.roots.initial_noise, None, p, to);
+    }
+
+    fn initial(&self, u: &[S], p: &[S], to: &mut [S]) {
+        to.fill(S::from(f64::NAN));
+        self.values(&self.roots.initial, Some((S::from(f64::NAN), &[], u)), p, to);
     }
 
     fn delay(&self, p: &[S], to: &mut [S]) {

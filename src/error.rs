@@ -281,6 +281,19 @@ pub enum Error {
         /// Unit of the time in which it grows.
         per: String,
     },
+    /// A record that begins at rest ([`Initial::Steady`](crate::record::Initial::Steady)) of a plant that does not rest at its first inputs.
+    #[error(
+        "experiment `{experiment}`: the plant has no state of rest under the inputs of the first sample, near what the outputs suggest: of state \
+         `{state}`, {reason}; have the initial state estimated, or give it (Experiment::initial)"
+    )]
+    NotAtRest {
+        /// Name of the experiment.
+        experiment: String,
+        /// Name of the state.
+        state: String,
+        /// Why there is none.
+        reason: String,
+    },
     /// States that were asked for by a predictor other than a Kalman filter.
     #[error(
         "states are filtered and smoothed by a Kalman filter, and this is {predictor}; take the predictor Kalman, with Model::diffusion and \
@@ -406,7 +419,7 @@ fn meant(name: &str, available: &[String]) -> String {
 }
 
 /// A number without the hundreds of zeros that a large or small one would be printed with.
-fn short(value: f64) -> String {
+pub(crate) fn short(value: f64) -> String {
     let plain = value == 0.0 || !value.is_finite() || (1e-4..1e7).contains(&value.abs());
     if plain { value.to_string() } else { format!("{value:e}") }
 }

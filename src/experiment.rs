@@ -160,6 +160,12 @@ impl<X: Signals, U: Signals, Y: Signals> Experiment<X, U, Y> {
         self.map(|record| Record { initial: Initial::FirstSample, ..record })
     }
 
+    /// Takes the plant to be at rest at the first sample, under the inputs there ([`Initial::Steady`]). Of several states of rest it takes the
+    /// one near that which the outputs suggest.
+    pub fn initially_at_rest(self) -> Self {
+        self.map(|record| Record { initial: Initial::Steady, ..record })
+    }
+
     /// The record by columns, its signals known by name.
     pub fn record(&self) -> &Record {
         &self.record

@@ -25,6 +25,9 @@ pub trait Functions<S>: Send + Sync {
     /// Standard deviation of each state at the first sample, as [`Model::initial_noise`].
     fn initial_noise(&self, p: &[S], to: &mut [S]);
 
+    /// The state at the first sample, as [`Model::initial`].
+    fn initial(&self, u: &[S], p: &[S], to: &mut [S]);
+
     /// Dead time of each input, as [`Model::delay`].
     fn delay(&self, p: &[S], to: &mut [S]);
 
@@ -167,6 +170,11 @@ impl<M: Model, S: Scalar> Functions<S> for Handle<'_, M> {
     fn initial_noise(&self, p: &[S], to: &mut [S]) {
         let p = M::Parameters::from_fn(|i| p[i]);
         to.copy_from_slice(M::State::into_array(Model::initial_noise(&**self, &p)).as_ref());
+    }
+
+    fn initial(&self, u: &[S], p: &[S], to: &mut [S]) {
+        let (u, p) = (M::Input::from_fn(|i| u[i]), M::Parameters::from_fn(|i| p[i]));
+        to.copy_from_slice(M::State::into_array(Model::initial(&**self, &u, &p)).as_ref());
     }
 
     fn delay(&self, p: &[S], to: &mut [S]) {

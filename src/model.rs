@@ -113,6 +113,15 @@ pub trait Model: Send + Sync {
         Self::State::splat(S::from(0.0))
     }
 
+    /// The state at the first sample, as the model has it: of the input there and of parameters, so that experiments share what is unknown of it (a
+    /// set point, an angle of rest). An entry that is not a number, as each is unless written, is not said: that state is estimated. What an
+    /// experiment declares of its own state ([`Experiment::initial`](crate::Experiment::initial)) stands in place of all entries; a simulation
+    /// is told its state ([`simulate`](crate::simulate)).
+    #[inline]
+    fn initial<S: Scalar>(&self, _u: &Of<Self::Input, S>, _p: &Of<Self::Parameters, S>) -> Of<Self::State, S> {
+        Self::State::splat(S::from(f64::NAN))
+    }
+
     /// Dead time of each input (s): at time `t` the model has the input of as much earlier; before the first sample, that of the first
     /// sample. Zero unless written. Continuous models see a held input jump between samples; a discrete or static one has the input that holds at
     /// the sample. One that is negative or not finite fails the simulation, which names it. Online observers refuse a dead time

@@ -37,11 +37,14 @@ use std::sync::{Arc, OnceLock};
 /// Declarations of the state at the first sample.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub enum Initial {
-    /// It is estimated, starting from the first measurement of each output, and from zero where that does not determine it.
+    /// It is what the model says ([`Model::initial`](crate::Model::initial)); a state that it does not say is estimated, starting from the first measurement of each output, and from zero where that does not determine it.
     #[default]
     Estimated,
     /// It is what the first sample says, taken as exact.
     FirstSample,
+    /// The plant rests at the first sample, under the inputs there: the state whose derivative is zero (continuous), or that the next sample does
+    /// not change (discrete), near the one that the outputs suggest.
+    Steady,
     /// Guess, bounds and prior of each state.
     Given(Vec<Parameter>),
 }

@@ -17,8 +17,18 @@ pub struct Recurrence {
     next: Vec<Id>,
     mean: Vec<Id>,
     variance: Vec<Id>,
-    /// From which carried entry on, and the states and parameters on which their start depends.
-    started: (usize, Vec<Leaf>),
+    started: Started,
+}
+
+/// What the carry at the first sample depends on.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Started {
+    /// How many entries are the state.
+    pub states: usize,
+    /// Parameters on which the state depends, which otherwise is an unknown or given.
+    pub state: Vec<Leaf>,
+    /// States and parameters on which the entries after it depend.
+    pub rest: Vec<Leaf>,
 }
 
 /// Roots that make no recurrence.
@@ -51,15 +61,24 @@ impl Recurrence {
         Recurrence { graph, next, mean: vec![], variance: vec![], started: self.started.clone() }
     }
 
-    /// This recurrence, where the start of the entries from `first` on depends on these states and parameters.
-    pub(crate) fn started(self, first: usize, from: Vec<Leaf>) -> Self {
-        Recurrence { started: (first, from), ..self }
+    /// This recurrence, which starts so.
+    pub(crate) fn started(self, started: Started) -> Self {
+        Recurrence { started, ..self }
+    }
+
+    /// This recurrence, from a state that depends on all parameters.
+    pub(crate) fn started_at_rest(&self, parameters: usize) -> Self {
+        let all = (0..parameters).map(|j| Leaf::Parameter(u32::try_from(j).unwrap_or(u32::MAX)));
+        let started = Started { state: all.clone().collect(), ..self.started.clone() };
+        // What depends on a state depends on what that does.
+        let rest = started.rest.iter().copied().chain(all).collect();
+        self.clone().started(Started { rest, ..started })
     }
 
     /// Whether the start of an entry depends on a state or a parameter.
     pub(crate) fn starts_from(&self, entry: usize, leaf: Leaf) -> bool {
-        let (first, from) = &self.started;
-        entry >= *first && from.contains(&leaf)
+        let Started { states, state, rest } = &self.started;
+        if entry < *states { state.contains(&leaf) } else { rest.contains(&leaf) }
     }
 
     /// A recurrence by the nodes of what is carried next, of the outputs' means, and of their variances, if it has any.
@@ -80,7 +99,7 @@ impl Recurrence {
         }
         let (next, rest) = roots.split_at(next.len());
         let (mean, variance) = rest.split_at(mean.len());
-        let started = (next.len(), vec![]);
+        let started = Started { states: next.len(), ..Started::default() };
         Ok(Recurrence { next: next.to_vec(), mean: mean.to_vec(), variance: variance.to_vec(), graph, started })
     }
 

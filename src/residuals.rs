@@ -187,7 +187,7 @@ fn residuals(objective: &Objective<'_>, coordinates: &[f64], all: &mut [Sums<'_>
 /// The begins of the records, then some points along them.
 fn points(objective: &Objective<'_>, coordinates: &[f64], all: &[Sums<'_>]) -> Vec<StateAt> {
     let begin = |experiment: usize| {
-        let state = objective.problem.unknowns.of_experiment(experiment, coordinates).x;
+        let state = objective.values_of(experiment, coordinates).x;
         StateAt { experiment, sample: 0, state }
     };
     let states = objective.problem.layout().states.len();

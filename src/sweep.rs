@@ -11,6 +11,7 @@ mod loops;
 mod made;
 mod model_code;
 mod programs;
+mod rest;
 mod states;
 mod window;
 
@@ -25,6 +26,7 @@ pub use window::Window;
 
 pub use crate::graph::Seed;
 pub use crate::predict::{Guess, Unstable};
+pub use rest::NotAtRest;
 
 use crate::error::{Error, Failure};
 use crate::layout::Layout;
@@ -89,6 +91,27 @@ pub enum RunError {
     },
     /// The function that is called with each window asked to stop.
     Stopped,
+}
+
+/// Why there is no carry at the first sample of a record.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum NoStart {
+    /// The plant has no stationary covariance.
+    Unstable(Unstable),
+    /// It has no state of rest.
+    NotAtRest(NotAtRest),
+}
+
+impl From<Unstable> for NoStart {
+    fn from(unstable: Unstable) -> Self {
+        NoStart::Unstable(unstable)
+    }
+}
+
+impl From<NotAtRest> for NoStart {
+    fn from(moving: NotAtRest) -> Self {
+        NoStart::NotAtRest(moving)
+    }
 }
 
 /// How a piece depends on the piece before it in the same record.
@@ -159,10 +182,16 @@ pub trait Sweep: Send + Sync {
     /// row by row.
     ///
     /// # Errors
-    /// A plant that is unstable where the predictor cannot start from one that is.
-    fn start(&self, record: &Record, state: &[f64], parameters: &[f64]) -> Result<Reached, Unstable> {
+    /// A plant that is unstable where the predictor cannot start from one that is, or that does not rest where the record begins at rest.
+    fn start(&self, record: &Record, state: &[f64], parameters: &[f64]) -> Result<Reached, NoStart> {
         let _ = record;
         Ok(unmoved(state, parameters))
+    }
+
+    /// Which states follow from the parameters at the first sample of a record, and are no unknowns.
+    fn follows(&self, record: &Record, parameters: &[f64]) -> Vec<bool> {
+        let _ = (record, parameters);
+        vec![false; self.layout().states.len()]
     }
 
     /// Runs pieces in parallel lanes and calls `visit` with each window.

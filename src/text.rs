@@ -193,7 +193,9 @@ impl Model {
         match begins.first() {
             None => Initial::Estimated,
             Some(Begin::FirstSample) => Initial::FirstSample,
-            _ if begins.iter().all(|begin| **begin == Begin::Estimated) => Initial::Estimated,
+            Some(Begin::Steady) => Initial::Steady,
+            // Functions are a part of the equations.
+            _ if begins.iter().all(|begin| matches!(begin, Begin::Estimated | Begin::Said(_))) => Initial::Estimated,
             _ => {
                 let given = |state: &document::State| match &state.begin {
                     Some((Begin::Given(parameter), _)) => *parameter,
@@ -271,7 +273,7 @@ fn unused(document: &Document, source: &Arc<Source>) -> Vec<Remark> {
     let rates = document
         .states
         .iter()
-        .flat_map(|state| [Some(&state.rate), state.diffusion.as_ref(), state.initial_noise.as_ref()]);
+        .flat_map(|state| [Some(&state.rate), state.diffusion.as_ref(), state.initial_noise.as_ref(), state.initial()]);
     let outputs = document.outputs.iter().flat_map(|output| [Some(&output.value), output.noise.as_ref()]);
     let delays = document.inputs.iter().map(|input| input.delay.as_ref());
     let all = rates.chain(outputs).chain(delays).flatten().chain(names::items(document));

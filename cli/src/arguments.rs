@@ -87,7 +87,8 @@ pub struct ModelOptions {
     /// Give each record a value of its own of a parameter.
     #[arg(long, value_name = "NAME")]
     pub per_record: Vec<String>,
-    /// The state at the first sample: `id=0` known, `id~0` estimated from there; `first` takes all from the first sample.
+    /// The state at the first sample: `id=0` known, `id~0` estimated from there; `first` takes all from the first sample,
+    /// `steady` those at which the plant rests.
     #[arg(long, value_name = "NAME=VALUE")]
     pub initial: Vec<String>,
 }

@@ -122,6 +122,9 @@ pub fn initial(layout: &Layout, said: &[String], before: &Initial) -> Result<Opt
     if said.iter().any(|one| one == "first") {
         return Ok(Some(Initial::FirstSample));
     }
+    if said.iter().any(|one| one == "steady") {
+        return Ok(Some(Initial::Steady));
+    }
     let mut all = match before {
         Initial::Given(given) => given.clone(),
         _ => vec![free(0.0); layout.states.len()],
@@ -130,7 +133,7 @@ pub fn initial(layout: &Layout, said: &[String], before: &Initial) -> Result<Opt
         let (name, known, value) = match (one.split_once('='), one.split_once('~')) {
             (Some((name, value)), _) => (name, true, value),
             (None, Some((name, value))) => (name, false, value),
-            _ => return Err(format!("--initial {one}: write NAME=VALUE, NAME~VALUE or first").into()),
+            _ => return Err(format!("--initial {one}: write NAME=VALUE, NAME~VALUE, first or steady").into()),
         };
         let value = number(&format!("--initial {name}"), value)?;
         let available = layout.states.iter().map(|state| state.name.clone()).collect();

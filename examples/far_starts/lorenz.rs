@@ -1,7 +1,7 @@
 //! E. N. Lorenz, *Deterministic nonperiodic flow*, Journal of the Atmospheric Sciences 20 (1963) 130-141.
 
 use crate::{Ended, Random, Study};
-use greybox::{Error, Experiment, Fit, Model, Nothing, Scalar, Signals, Time, free, signals, simulate};
+use greybox::{Error, Experiment, Fit, Model, Nothing, Rk4, Scalar, Signals, Time, free, signals, simulate};
 
 signals! {
     pub struct Flow { x: "1", y: "1", z: "1" }
@@ -51,6 +51,8 @@ impl Model for FirstAlone {
 
 const TRUTH: Constants = Constants { sigma: 10.0, rho: 28.0, beta: 8.0 / 3.0 };
 const STEP: f64 = 0.01;
+/// Of a sample: over twenty time units the error of a step grows by some `exp(18)`.
+const STEPS: Rk4 = Rk4 { substeps: 4 };
 /// Part of each output's standard deviation.
 const NOISE: f64 = 0.05;
 /// A parameter that is this far off, relatively, is wrong; noise moves it by some 0.1 %.
@@ -101,7 +103,7 @@ pub fn all(study: &Study<'_>, mut random: Random, length: f64) -> Result<Ended, 
     let (time, outputs) = simulated(&mut random, length)?;
     let outputs = measured(&mut random, &outputs);
     let record = Experiment::new(&All, time, vec![Nothing; outputs.len()], outputs)?;
-    let found = study.of(Fit::new(&All, &record).parameters(start(&mut random))).run();
+    let found = study.of(Fit::new(&All, &record).parameters(start(&mut random)).integrator(STEPS)).run();
     Ok(study.ended(found.as_ref().map(|found| found.summary()), distance))
 }
 
@@ -109,6 +111,6 @@ pub fn first_alone(study: &Study<'_>, mut random: Random) -> Result<Ended, Error
     let (time, outputs) = simulated(&mut random, 20.0)?;
     let outputs: Vec<First> = measured(&mut random, &outputs).iter().map(|y| First { x: y.x }).collect();
     let record = Experiment::new(&FirstAlone, time, vec![Nothing; outputs.len()], outputs)?;
-    let found = study.of(Fit::new(&FirstAlone, &record).parameters(start(&mut random))).run();
+    let found = study.of(Fit::new(&FirstAlone, &record).parameters(start(&mut random)).integrator(STEPS)).run();
     Ok(study.ended(found.as_ref().map(|found| found.summary()), distance))
 }

@@ -33,6 +33,7 @@ class Model:
     ``diffusion(t, x, u, p)``  the intensity of the process noise of each state, for a Kalman predictor
     ``noise(t, x, u, p)``      the standard deviation of the noise of each output, for a Kalman predictor
     ``initial_noise(p)``       the standard deviation of each state at the first sample, for a Kalman predictor
+    ``initial(u, p)``          the state at the first sample, where a record does not say it
     ``delay(p)``               the dead time of each input (s)
     ========================== =======================================================================
 
@@ -92,6 +93,10 @@ class Model:
     def initial_noise(self, p: Vector) -> Returned:
         """Give the standard deviation of each state at the first sample."""
         raise NotImplementedError(f"{type(self).__name__} has no method initial_noise(self, p)")
+
+    def initial(self, u: Vector, p: Vector) -> Returned:
+        """Give the state at the first sample, from the inputs there; NaN of a state that is estimated."""
+        raise NotImplementedError(f"{type(self).__name__} has no method initial(self, u, p)")
 
     def delay(self, p: Vector) -> Returned:
         """Give the dead time of each input (s)."""
@@ -175,6 +180,7 @@ def model(
     diffusion: Callable[..., Returned] | None = None,
     noise: Callable[..., Returned] | None = None,
     initial_noise: Callable[..., Returned] | None = None,
+    initial: Callable[..., Returned] | None = None,
     delay: Callable[..., Returned] | None = None,
     states: SignalsLike = (),
     inputs: SignalsLike = (),
@@ -189,6 +195,8 @@ def model(
         As the methods of :class:`Model`, without ``self``.
     initial_noise, delay : callable, optional
         The same, of ``p`` alone.
+    initial : callable, optional
+        The same, of ``u`` and ``p``.
     states, inputs, outputs, parameters : Signals, mapping from names to units, or names
         The quantities.
 
@@ -203,7 +211,7 @@ def model(
     d(body)/dt = k * (room - body)
     output body = body
     """
-    levels = {"diffusion": diffusion, "noise": noise, "initial_noise": initial_noise, "delay": delay}
+    levels = {"diffusion": diffusion, "noise": noise, "initial_noise": initial_noise, "initial": initial, "delay": delay}
     functions = {"derivative": derivative, "next": next, "output": output, **levels}
     given = {name: function for name, function in functions.items() if function is not None}
     return _Functions(given, {"states": states, "inputs": inputs, "outputs": outputs, "parameters": parameters})
@@ -274,7 +282,6 @@ def _roots(
     x, u, p = vector("states", graph.state), vector("inputs", graph.input), vector("parameters", graph.parameter)
     output = _written(of, "output") or (lambda *args: Model.output(of, *args))
     levels = {"diffusion": "states", "noise": "outputs"}
-    constant = {"initial_noise": "states", "delay": "inputs"}
 
     def nodes(role: str, function: Callable[..., Returned] | None, name: str, *args: Any) -> list[_core.Node]:
         if function is None:
@@ -282,7 +289,7 @@ def _roots(
         try:
             inspect.signature(function).bind(*args)
         except TypeError as error:
-            given = "p" if len(args) == 1 else "t, x, u, p"
+            given = {1: "p", 2: "u, p"}.get(len(args), "t, x, u, p")
             raise Error(f"{name} of {title} cannot be called with ({given}), which are handed over: {error}") from None
         return _returned(trace, function(*args), tuple(quantities[role]), f"{name} of {title}")
 
@@ -291,7 +298,9 @@ def _roots(
         nodes("states", state, name, t, x, u, p),
         nodes("outputs", output, "output", t, x, u, p),
         *(nodes(role, _written(of, name), name, t, x, u, p) for name, role in levels.items()),
-        *(nodes(role, _written(of, name), name, p) for name, role in constant.items()),
+        nodes("states", _written(of, "initial_noise"), "initial_noise", p),
+        nodes("states", _written(of, "initial"), "initial", u, p),
+        nodes("inputs", _written(of, "delay"), "delay", p),
     ]
 
 

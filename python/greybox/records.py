@@ -25,7 +25,7 @@ __all__ = ["Hold", "Initial", "Record", "kind_of", "opened", "records"]
 Hold: TypeAlias = "Literal['zero', 'first'] | Mapping[str, Literal['zero', 'first']]"
 
 #: What is said of the state at the first sample.
-Initial: TypeAlias = "Literal['estimated', 'first'] | Mapping[str, Parameter]"
+Initial: TypeAlias = "Literal['estimated', 'first', 'steady'] | Mapping[str, Parameter]"
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ class Record:
     hold : {"zero", "first"}, or mapping from input to these
         The inputs between samples: constant, as a digital controller commands them, or straight lines, as measured quantities go.
         Inputs that a mapping leaves out, and all without one, are as a model file says, or constant.
-    initial : {"estimated", "first"} or mapping from str to Parameter
+    initial : {"estimated", "first", "steady"} or mapping from str to Parameter
         The state at the first sample: estimated, computed from the first sample, or declared for each state by
         :func:`~greybox.free` and :func:`~greybox.fixed`. Without it, as a model file says, or estimated.
     """

@@ -102,8 +102,9 @@ impl Start {
             Start::Given(given) => Ok(Initial::Given(given.iter().map(|one| one.0).collect())),
             Start::Named(name) if name == "estimated" => Ok(Initial::Estimated),
             Start::Named(name) if name == "first" => Ok(Initial::FirstSample),
+            Start::Named(name) if name == "steady" => Ok(Initial::Steady),
             Start::Named(name) => Err(raised(format!(
-                "there is no initial state `{name}`; take estimated, first, or a declaration for each state"
+                "there is no initial state `{name}`; take estimated, first, steady, or a declaration for each state"
             ))),
         }
     }
@@ -189,6 +190,7 @@ impl Record {
         let initial = match record.initial_state() {
             Initial::Estimated => "estimated".into_pyobject(py)?.into_any(),
             Initial::FirstSample => "first".into_pyobject(py)?.into_any(),
+            Initial::Steady => "steady".into_pyobject(py)?.into_any(),
             Initial::Given(given) => given.iter().map(|one| Parameter(*one)).collect::<Vec<_>>().into_pyobject(py)?,
         };
         let (inputs, outputs) = (shared(slf.get().inputs(py)), shared(slf.get().outputs(py)));

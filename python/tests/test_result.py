@@ -173,3 +173,19 @@ def test_levels_that_move() -> None:
     weights = u / deviation**2
     assert found.parameters.a == pytest.approx((weights * frame["y"]).sum() / (weights * u).sum(), rel=1e-12)
     assert found.standard_errors.a == pytest.approx((weights * u).sum() ** -0.5, rel=1e-6)
+
+
+def test_initial_functions() -> None:
+    """The state at rest, and one that the model says, are no unknowns; records share what is unknown of the latter."""
+    u = np.where(np.arange(200) < 20, 2.0, -1.0)
+    frame = pd.DataFrame({"t": 0.1 * np.arange(200.0), "u": u})
+    parts = {"states": ["x"], "inputs": ["u"], "outputs": ["x"]}
+    plain = gb.model(lambda t, x, u, p: [u.u - p.a * x.x], **parts, parameters=["a"])
+    record = gb.simulate(plain, frame, parameters={"a": 0.5}, initial={"x": 4.0}, time="t")
+    rest = gb.fit(plain, record, a=gb.free(0.8), time="t", initial="steady")
+    assert list(rest.table().index) == ["a"] and rest.parameters.a == pytest.approx(0.5, rel=1e-6)
+    says = gb.model(lambda t, x, u, p: [u.u - p.a * x.x], initial=lambda u, p: [p.x0 + 0 * u.u], **parts, parameters=["a", "x0"])
+    both = gb.fit(says, [record, record], a=gb.free(0.8), x0=gb.free(1.0), time="t")
+    assert both.parameters.x0 == pytest.approx(4.0, rel=1e-6) and len(both.table()) == 2
+    with pytest.raises(gb.Error, match=r"\(u, p\)"):
+        gb.model(lambda t, x, u, p: [u.u], initial=lambda p: [p.x0], **parts, parameters=["x0"]).equations()

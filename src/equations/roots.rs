@@ -4,8 +4,8 @@ use super::InvalidEquations;
 use crate::graph::Id;
 use crate::layout::{Kind, Layout};
 
-/// The nodes of a graph that make up [`Equations`](super::Equations). Lists other than the first two may be left empty; the last two depend on
-/// parameters alone.
+/// The nodes of a graph that make up [`Equations`](super::Equations). Lists other than the first two may be left empty; dead times and the noise of the initial
+/// state depend on parameters alone, the initial state on these and inputs.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Roots {
     /// The derivative of each state (continuous) or its next value (discrete); empty for a static model.
@@ -18,6 +18,8 @@ pub struct Roots {
     pub noise: Vec<Id>,
     /// The standard deviation of each state at the first sample, as [`Model::initial_noise`](crate::Model::initial_noise).
     pub initial_noise: Vec<Id>,
+    /// The state at the first sample, as [`Model::initial`](crate::Model::initial).
+    pub initial: Vec<Id>,
     /// The dead time of each input (s), as [`Model::delay`](crate::Model::delay).
     pub delay: Vec<Id>,
 }
@@ -35,7 +37,8 @@ impl Roots {
 
     /// All, in the order of the fields.
     pub(crate) fn all(&self) -> Vec<Id> {
-        [self.moving(), self.diffusion.clone(), self.noise.clone(), self.constant()].concat()
+        let levels = [&*self.diffusion, &self.noise, &self.initial_noise, &self.initial, &self.delay].concat();
+        [self.moving(), levels].concat()
     }
 
     /// Roots of these counts, from a list of all of them in the order of the fields.
@@ -48,6 +51,7 @@ impl Roots {
             diffusion: take(&self.diffusion),
             noise: take(&self.noise),
             initial_noise: take(&self.initial_noise),
+            initial: take(&self.initial),
             delay: take(&self.delay),
         }
     }
@@ -62,6 +66,7 @@ impl Roots {
             ("diffusions of states", states, &self.diffusion, true),
             ("noises of outputs", outputs, &self.noise, true),
             ("initial noises of states", states, &self.initial_noise, true),
+            ("initial states", states, &self.initial, true),
             ("dead times of inputs", inputs, &self.delay, true),
         ];
         for (role, expected, found, may_be_empty) in counts {

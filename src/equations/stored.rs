@@ -20,13 +20,15 @@ pub(super) struct Parts {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     initial_noise: Vec<Id>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    initial: Vec<Id>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     delay: Vec<Id>,
 }
 
 impl From<Equations> for Parts {
     fn from(Equations { layout, graph, roots }: Equations) -> Self {
-        let Roots { state, output, diffusion, noise, initial_noise, delay } = roots;
-        Parts { layout, graph, state, output, diffusion, noise, initial_noise, delay }
+        let Roots { state, output, diffusion, noise, initial_noise, initial, delay } = roots;
+        Parts { layout, graph, state, output, diffusion, noise, initial_noise, initial, delay }
     }
 }
 
@@ -34,7 +36,7 @@ impl TryFrom<Parts> for Equations {
     type Error = InvalidEquations;
 
     fn try_from(parts: Parts) -> Result<Self, InvalidEquations> {
-        let Parts { layout, graph, state, output, diffusion, noise, initial_noise, delay } = parts;
-        Equations::complete(layout, &graph, &Roots { state, output, diffusion, noise, initial_noise, delay })
+        let Parts { layout, graph, state, output, diffusion, noise, initial_noise, initial, delay } = parts;
+        Equations::complete(layout, &graph, &Roots { state, output, diffusion, noise, initial_noise, initial, delay })
     }
 }

@@ -53,7 +53,7 @@ pub(crate) fn parameters(evidence: &Evidence<'_>, unknowns: &[Unknown]) -> Vec<P
 pub(crate) fn experiments(point: &Point<'_>) -> Vec<ExperimentEstimate> {
     let problem = point.objective.problem;
     let one = |e: usize| {
-        let values = problem.unknowns.of_experiment(e, &point.end.coordinates);
+        let values = point.objective.values_of(e, &point.end.coordinates);
         ExperimentEstimate {
             name: problem.unknowns.labels[e].clone(),
             samples: problem.records[e].len() as u64,

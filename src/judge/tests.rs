@@ -8,7 +8,7 @@ use crate::layout::Layout;
 use crate::problem::{Memory, Problem};
 use crate::random::Random;
 use crate::record::Record;
-use crate::sweep::{Coupling, Guess, Piece, Prepared, Reached, RunError, Seed, Sweep, Unstable, Visit};
+use crate::sweep::{Coupling, Guess, NoStart, Piece, Prepared, Reached, RunError, Seed, Sweep, Visit};
 use crate::{Experiment, Fit, Model, Scalar, Time, free, signals, simulate};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -34,7 +34,8 @@ impl Sweep for Counting<'_> {
     fn linearizes_choices(&self) -> bool { self.sweep.linearizes_choices() }
     fn second_order<'s>(&'s self) -> Option<Arc<dyn Sweep + 's>> { self.sweep.second_order() }
     fn prepare(&self, record: &Record, p: &[f64]) -> Result<Prepared, Error> { self.sweep.prepare(record, p) }
-    fn start(&self, record: &Record, state: &[f64], p: &[f64]) -> Result<Reached, Unstable> { self.sweep.start(record, state, p) }
+    fn follows(&self, record: &Record, p: &[f64]) -> Vec<bool> { self.sweep.follows(record, p) }
+    fn start(&self, record: &Record, state: &[f64], p: &[f64]) -> Result<Reached, NoStart> { self.sweep.start(record, state, p) }
     fn run(&self, pieces: &[Piece<'_>], seeds: &[Seed], visit: Visit<'_>) -> Vec<Result<Reached, RunError>> {
         let samples = pieces.iter().map(|piece| piece.samples.len()).sum();
         self.counts[usize::from(!seeds.is_empty())].fetch_add(samples, Ordering::Relaxed);

@@ -7,7 +7,7 @@ use crate::graph::{Graph, Id, Leaf, Node, Symbol, Untraceable};
 use crate::integrate::{Method, Stuck};
 use crate::layout::{Kind, Layout};
 use crate::record::Holds;
-use crate::recurrence::{Recurrence, SymbolicInterval};
+use crate::recurrence::{Recurrence, Started, SymbolicInterval};
 use crate::scalar::{Comparison, Scalar};
 use core::cell::OnceCell;
 
@@ -58,11 +58,11 @@ pub(crate) fn recurrence(
     let (mean, variance) = rest.split_at(outputs.min(rest.len()));
     let made = Recurrence::from_roots(&graph, next, mean, variance);
     let made = made.map_err(|wrong| Untraceable { reason: wrong.to_string() })?;
-    Ok(made.started(layout.states.len(), start_leaves(equations, slopes.as_ref(), predictor)))
+    Ok(made.started(started(equations, slopes.as_ref(), predictor)))
 }
 
-/// The states and parameters on which a predictor's start depends.
-fn start_leaves(equations: &Equations, slopes: Option<&Slopes>, predictor: &dyn Prediction) -> Vec<Leaf> {
+/// The states and parameters on which the start depends.
+fn started(equations: &Equations, slopes: Option<&Slopes>, predictor: &dyn Prediction) -> Started {
     let (layout, roots) = (equations.layout(), equations.roots());
     let number = |i: usize| u32::try_from(i).unwrap_or(u32::MAX);
     let states = (0..layout.states.len()).map(|i| Leaf::State(number(i)));
@@ -75,15 +75,18 @@ fn start_leaves(equations: &Equations, slopes: Option<&Slopes>, predictor: &dyn 
         };
         nodes.filter_map(leaf).collect()
     };
-    match (predictor.starts_from(), slopes) {
+    let rest = match (predictor.starts_from(), slopes) {
         (StartsFrom::InitialNoise, _) => of(equations.graph(), &roots.initial_noise),
         (StartsFrom::Slopes, Some(Slopes { state, .. })) => {
             // Inputs may be late.
             let levels = of(equations.graph(), &[&*roots.diffusion, &roots.delay].concat());
             [levels, of(&state.graph, &state.entries)].concat()
         }
-        _ => all,
-    }
+        _ => all.clone(),
+    };
+    let state = of(equations.graph(), &roots.initial);
+    // What depends on a state depends on what that does.
+    Started { states: layout.states.len(), rest: [rest, state.clone()].concat(), state }
 }
 
 /// A plant in symbols.

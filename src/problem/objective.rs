@@ -142,7 +142,7 @@ impl<'p> Objective<'p> {
     pub(crate) fn locate(&self, e: usize, coordinates: &[f64], sample: usize) -> Failure {
         let (problem, sigma) = (self.problem, self.whitening.sigma());
         let (label, record) = (&problem.unknowns.labels[e], &problem.records[e]);
-        let values = problem.unknowns.of_experiment(e, coordinates);
+        let values = self.values_of(e, coordinates);
         let stops = || self.control.stops();
         let found = self.sweep.locate(record, &values.x, &values.p, sample, &sigma, &stops);
         let failure = |signal: String, value: f64, hint| Failure {

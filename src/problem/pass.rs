@@ -57,6 +57,18 @@ impl Objective<'_> {
         (0..self.experiments()).map(|e| self.problem.unknowns.of_experiment(e, coordinates)).collect()
     }
 
+    /// Initial state and parameters of one experiment, also of states that follow from the parameters: not numbers where there are none.
+    pub(crate) fn values_of(&self, e: usize, coordinates: &[f64]) -> Values {
+        let values = self.problem.unknowns.of_experiment(e, coordinates);
+        if !self.problem.unknowns.follows(e) {
+            return values;
+        }
+        let states = values.x.len();
+        let started = self.sweep.start(&self.problem.records[e], &values.x, &values.p);
+        let x = started.map_or(vec![f64::NAN; states], |started| started.carry[..states].to_vec());
+        Values { x, ..values }
+    }
+
     /// Runs one experiment alone and calls `visit` with its windows, in the units of the outputs.
     pub(crate) fn run_alone(
         &self,

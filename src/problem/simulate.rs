@@ -62,7 +62,7 @@ impl Objective<'_> {
             measured.iter().zip(predicted).map(|(y, predicted)| y - predicted).collect()
         };
         let residuals = measured.iter().zip(&outputs).map(residual).collect();
-        let initial_state = self.problem.unknowns.of_experiment(e, coordinates).x;
+        let initial_state = self.values_of(e, coordinates).x;
         Ok(Simulated { names: names(&self.problem.layout().outputs), outputs, residuals, initial_state })
     }
 }

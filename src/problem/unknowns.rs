@@ -3,13 +3,13 @@
 //! The vector holds the parameters that all experiments share, then for each experiment its free initial states and its
 //! local parameters. The optimizer works on coordinates: values, or their logarithms.
 
-use crate::error::Error;
+use crate::error::{Error, short};
 use crate::information::Information;
 use crate::layout::{Kind, Layout, Quantity};
 use crate::numeral::exact;
 use crate::parameter::{Parameter, Transform, fixed, free};
 use crate::record::{Initial, Record};
-use crate::sweep::{Guess, Seed, Sweep, Unstable};
+use crate::sweep::{Guess, NoStart, NotAtRest, Seed, Sweep, Unstable};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
@@ -53,6 +53,8 @@ pub(crate) struct Unknowns {
     pub parameters: Vec<Parameter>,
     /// Declarations of each experiment's initial state.
     initial: Vec<Vec<Parameter>>,
+    /// Whether some of it follows from the parameters.
+    follows: Vec<bool>,
     pub row: Vec<Free>,
     /// Index of the first local unknown of each experiment, then the number of unknowns.
     begins: Vec<usize>,
@@ -88,10 +90,10 @@ impl Unknowns {
             (0..parameters.len()).filter(move |&i| parameters[i].free && parameters[i].per_experiment == own)
         };
         let mut row: Vec<Free> = chosen(false).map(|i| free_of(i, None)).collect();
-        let (mut begins, mut initial) = (vec![], vec![]);
+        let (mut begins, mut initial, mut follows) = (vec![], vec![], vec![]);
         for (e, record) in records.iter().enumerate() {
             begins.push(row.len());
-            let InitialState { state, open, sizes } = InitialState::of(sweep, record, parameters)?;
+            let InitialState { state, open, sizes, follow } = InitialState::of(sweep, record, parameters)?;
             for (i, (&known, Quantity { name, unit })) in state.iter().zip(&layout.states).enumerate() {
                 let name = labeled(&format!("{name}(0)"), e);
                 check(&name, &known)?;
@@ -107,9 +109,11 @@ impl Unknowns {
             }
             row.extend(chosen(true).map(|i| free_of(i, Some(e))));
             initial.push(state);
+            follows.push(follow);
         }
         begins.push(row.len());
-        let mut unknowns = Unknowns { labels, parameters: parameters.to_vec(), initial, row, begins, seeds: vec![] };
+        let (parameters, seeds) = (parameters.to_vec(), vec![]);
+        let mut unknowns = Unknowns { labels, parameters, initial, follows, row, begins, seeds };
         unknowns.seeds = unknowns.all_seeds();
         Ok(unknowns)
     }
@@ -134,25 +138,34 @@ impl Unknowns {
         let (start, layout) = (self.start(), sweep.layout());
         for (e, record) in records.iter().enumerate() {
             let Values { x, p } = self.of_experiment(e, &start);
-            sweep.start(record, &x, &p).map_err(|unstable| self.not_stationary(layout, record, e, unstable))?;
+            sweep.start(record, &x, &p).map_err(|none| self.no_start(layout, record, e, none))?;
         }
         Ok(())
     }
 
-    /// The error of an experiment whose plant is unstable where the predictor needs one that is not.
-    pub fn not_stationary(
-        &self,
-        layout: &Layout,
-        record: &Record,
-        e: usize,
-        Unstable { state, rate }: Unstable,
-    ) -> Error {
-        Error::NotStationary {
-            experiment: self.labels[e].clone(),
-            state: layout.states.get(state).map_or_else(String::new, |state| state.name.clone()),
-            rate,
-            per: if layout.kind == Kind::Discrete { "sample" } else { record.time_unit().base() }.to_owned(),
+    /// The error of an experiment that has no carry at its first sample.
+    pub fn no_start(&self, layout: &Layout, record: &Record, e: usize, none: NoStart) -> Error {
+        let name = |state: usize| layout.states.get(state).map_or_else(String::new, |state| state.name.clone());
+        let experiment = self.labels[e].clone();
+        let per = if layout.kind == Kind::Discrete { "sample" } else { record.time_unit().base() }.to_owned();
+        match none {
+            NoStart::Unstable(Unstable { state, rate }) => {
+                Error::NotStationary { experiment, state: name(state), rate, per }
+            }
+            NoStart::NotAtRest(NotAtRest { state, rate }) => {
+                let unit = layout.states.get(state).map_or_else(String::new, |state| state.unit.clone());
+                let reason = match rate {
+                    Some(rate) => format!("it still changes by {} {unit} per {per}", short(rate)),
+                    None => "it rests at any value".to_owned(),
+                };
+                Error::NotAtRest { experiment, state: name(state), reason }
+            }
         }
+    }
+
+    /// Whether some of an experiment's initial state follows from the parameters.
+    pub fn follows(&self, experiment: usize) -> bool {
+        self.follows[experiment]
     }
 
     /// The bounds of each coordinate.
@@ -169,7 +182,7 @@ impl Unknowns {
         self.row.iter().zip(coordinates).map(|(u, &c)| u.parameter.transform.to_value(c)).collect()
     }
 
-    /// Initial state and parameters of one experiment.
+    /// Initial state and parameters of one experiment; of states that follow from the parameters, that of the start.
     pub fn of_experiment(&self, experiment: usize, coordinates: &[f64]) -> Values {
         let start = |known: &[Parameter]| known.iter().map(|p| p.start).collect::<Vec<f64>>();
         let mut values = Values { x: start(&self.initial[experiment]), p: start(&self.parameters) };
@@ -258,6 +271,8 @@ struct InitialState {
     /// Which entries are a start that nobody gave: neither the user nor the outputs.
     open: Vec<bool>,
     sizes: Vec<Option<f64>>,
+    /// Whether some of it follows from the parameters.
+    follow: bool,
 }
 
 impl InitialState {
@@ -266,7 +281,7 @@ impl InitialState {
         let unknown = |reason, remedy| Error::StateNotMeasured { experiment: record.name().to_owned(), reason, remedy };
         let known = |state: Vec<Parameter>| {
             let n = state.len();
-            InitialState { state, open: vec![false; n], sizes: vec![None; n] }
+            InitialState { state, open: vec![false; n], sizes: vec![None; n], follow: false }
         };
         match record.initial_state() {
             Initial::Given(state) => Ok(known(state.clone())),
@@ -276,11 +291,13 @@ impl InitialState {
                 let x = sweep.measured_state(record, 0, &p).map_err(|reason| unknown(reason, remedy))?;
                 Ok(known(x.into_iter().map(fixed).collect()))
             }
-            Initial::Estimated => {
+            Initial::Estimated | Initial::Steady => {
                 let remedy = "give a start for it with Experiment::initial";
                 let guess = sweep.guessed_state(record, &p).map_err(|reason| unknown(reason, remedy))?;
-                let Guess { state, open, sizes } = guess;
-                Ok(InitialState { state: state.into_iter().map(free).collect(), open, sizes })
+                let (Guess { state, open, sizes }, follows) = (guess, sweep.follows(record, &p));
+                let declared = |(x, follows): (f64, &bool)| if *follows { fixed(x) } else { free(x) };
+                let state = state.into_iter().zip(&follows).map(declared).collect();
+                Ok(InitialState { state, open, sizes, follow: follows.contains(&true) })
             }
         }
     }

@@ -53,6 +53,7 @@ impl Serialize for Values<'_> {
 enum StoredInitial {
     Estimated,
     FirstSample,
+    Steady,
     Given(Entries<Parameter>),
 }
 
@@ -61,6 +62,7 @@ impl StoredInitial {
         match initial {
             Initial::Estimated => StoredInitial::Estimated,
             Initial::FirstSample => StoredInitial::FirstSample,
+            Initial::Steady => StoredInitial::Steady,
             Initial::Given(given) => {
                 let named = states.iter().map(|state| state.name.clone()).zip(given.iter().copied());
                 StoredInitial::Given(Entries(named.collect()))
@@ -72,6 +74,7 @@ impl StoredInitial {
         let given = match self {
             StoredInitial::Estimated => return Ok(Initial::Estimated),
             StoredInitial::FirstSample => return Ok(Initial::FirstSample),
+            StoredInitial::Steady => return Ok(Initial::Steady),
             StoredInitial::Given(given) => given,
         };
         given.in_order(names(states)).map(Initial::Given)

@@ -71,6 +71,7 @@ mod tests {
         fn diffusion(&self, _t: f64, _x: &[f64], _u: &[f64], _p: &[f64], _to: &mut [f64]) {}
         fn noise(&self, _t: f64, _x: &[f64], _u: &[f64], _p: &[f64], _to: &mut [f64]) {}
         fn initial_noise(&self, _p: &[f64], _to: &mut [f64]) {}
+        fn initial(&self, _u: &[f64], _p: &[f64], _to: &mut [f64]) {}
         fn delay(&self, _p: &[f64], _to: &mut [f64]) {}
     }
 

@@ -3,14 +3,14 @@
 use super::affine::not_affine;
 use super::failure::FailureSearch;
 use super::filtered::Filter;
-use super::{ModelCode, Piece, Prepared, Reached, RunError, Seed, States, Sweep, Visit, unmoved};
+use super::{ModelCode, NoStart, Piece, Prepared, Reached, RunError, Seed, States, Sweep, Visit, unmoved};
 use crate::error::{Error, Failure};
 use crate::functions::delays;
 use crate::graph::Choices;
 use crate::integrate::Method;
 use crate::layout::{Kind, Layout};
-use crate::predict::{FreeRun, Guess, Place, Prediction, Unstable};
-use crate::record::{Channel, Record};
+use crate::predict::{FreeRun, Guess, Place, Prediction};
+use crate::record::{Channel, Initial, Record};
 use std::sync::Arc;
 
 /// What is known of equations that run in dual numbers.
@@ -97,10 +97,19 @@ impl Sweep for DualSweep<'_> {
         Ok(Prepared { restarts, ..Prepared::default() })
     }
 
-    fn start(&self, record: &Record, state: &[f64], parameters: &[f64]) -> Result<Reached, Unstable> {
-        match self.predictor.is_simulation() {
+    fn start(&self, record: &Record, state: &[f64], parameters: &[f64]) -> Result<Reached, NoStart> {
+        let follows = self.follows(record, parameters);
+        match self.predictor.is_simulation() && !follows.contains(&true) {
             true => Ok(unmoved(state, parameters)),
-            false => self.filter(parameters).start(record, state, parameters),
+            false => self.filter(parameters).start(record, state, &follows, parameters),
+        }
+    }
+
+    fn follows(&self, record: &Record, parameters: &[f64]) -> Vec<bool> {
+        match record.initial_state() {
+            Initial::Steady => vec![true; self.layout.states.len()],
+            Initial::Estimated => self.code.begins(parameters),
+            Initial::FirstSample | Initial::Given(_) => vec![false; self.layout.states.len()],
         }
     }
 

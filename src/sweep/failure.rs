@@ -163,6 +163,10 @@ impl Functions<f64> for Watched<'_> {
         self.values.initial_noise(p, to);
     }
 
+    fn initial(&self, u: &[f64], p: &[f64], to: &mut [f64]) {
+        self.values.initial(u, p, to);
+    }
+
     fn delay(&self, p: &[f64], to: &mut [f64]) {
         self.values.delay(p, to);
     }

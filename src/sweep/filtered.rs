@@ -1,13 +1,14 @@
 //! A piece run by a [`Predictor`](crate::Predictor) of any kind, on vectors of run-time length: filters of all models, and models that
 //! have no types.
 
-use super::{Piece, Reached, RunError, Seed, Visit, Window};
+use super::rest::Rest;
+use super::{NoStart, Piece, Reached, RunError, Seed, Visit, Window};
 use crate::dual::Dual;
 use crate::functions::{Functions, delays};
 use crate::integrate::{Duals, Method, Stuck};
 use crate::layout::Layout;
-use crate::predict::{Between, Prediction, SlicePlant, Stepped, Steps, Unstable};
-use crate::record::Record;
+use crate::predict::{Between, Prediction, SlicePlant, Stepped, Steps};
+use crate::record::{Initial, Record};
 use crate::scalar::Scalar;
 use core::cell::Cell;
 
@@ -91,16 +92,24 @@ impl Number for Duals {
 }
 
 impl Filter<'_> {
-    /// The carry at the first sample, with slopes with respect to states, then parameters.
+    /// The carry at the first sample, with slopes with respect to states, then parameters; of the states, some follow from the parameters.
     ///
     /// # Errors
-    /// A plant that is unstable where the predictor cannot start from one that is.
-    pub fn start(&self, record: &Record, state: &[f64], parameters: &[f64]) -> Result<Reached, Unstable> {
+    /// A plant that is unstable where the predictor cannot start from one that is, or that does not rest where it should.
+    pub fn start(
+        &self,
+        record: &Record,
+        state: &[f64],
+        follows: &[bool],
+        parameters: &[f64],
+    ) -> Result<Reached, NoStart> {
         // Of several samples at the first instant the last, from which time passes.
         let sample = (1..record.len()).take_while(|k| record.time(*k) == record.time(0)).last().unwrap_or(0);
         let (n, width) = (state.len(), state.len() + parameters.len());
         let size = self.predictor.carry(self.layout);
         let mut reached = Reached { carry: vec![0.0; size], slopes: vec![0.0; size * width] };
+        let rests = follows.contains(&true) && *record.initial_state() == Initial::Steady;
+        let rest = if rests { Some(Rest::near(self, record, state, parameters)?) } else { None };
         for first in (0..width.max(1)).step_by(SLOPES) {
             let lane = |i: usize| i.wrapping_sub(first);
             let mut carry = vec![Duals::constant(0.0); size];
@@ -109,8 +118,18 @@ impl Filter<'_> {
             }
             let p: Vec<Duals> = parameters.iter().enumerate().map(|(j, p)| Dual::variable(*p, lane(n + j))).collect();
             let step = Cell::new(0.0);
-            let plant =
-                self.plant(self.duals, Between::new(record, sample, &delays(self.duals, &self.late, &p)), &p, &step);
+            let delays = delays(self.duals, &self.late, &p);
+            match &rest {
+                Some(rest) => carry[..n].copy_from_slice(&rest.state(self, record, &delays, &p)),
+                None if follows.contains(&true) => {
+                    let mut said = carry[..n].to_vec();
+                    self.duals.initial(&Between::new(record, 0, &delays).input(0.0), &p, &mut said);
+                    let all = carry.iter_mut().zip(said).zip(follows).filter(|(_, follows)| **follows);
+                    all.for_each(|((x, said), _)| *x = said);
+                }
+                None => {}
+            }
+            let plant = self.plant(self.duals, Between::new(record, sample, &delays), &p, &step);
             self.predictor.duals().start(&plant, &mut carry)?;
             for (entry, x) in carry.iter().enumerate() {
                 reached.carry[entry] = x.value;

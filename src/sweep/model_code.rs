@@ -40,6 +40,9 @@ pub(crate) trait ModelCode: Send + Sync {
     /// Which inputs have a dead time at these parameters.
     fn late(&self, p: &[f64]) -> Vec<bool>;
 
+    /// Which states the model says at the first sample.
+    fn begins(&self, p: &[f64]) -> Vec<bool>;
+
     /// Text that identifies the equations.
     fn identity(&self) -> String;
 }
@@ -90,6 +93,15 @@ impl<M: Model> ModelCode for Typed<'_, M> {
             late.iter_mut().zip(&delay).for_each(|(late, delay)| *late |= !zero(delay));
         }
         late
+    }
+
+    /// Those that are a number, or one that is undefined at these parameters: its slopes are not zero then.
+    fn begins(&self, p: &[f64]) -> Vec<bool> {
+        let p: Vec<Duals> = p.iter().enumerate().map(|(j, p)| Dual::variable(*p, j % COLUMNS)).collect();
+        let u = vec![Duals::constant(0.0); M::Input::LEN];
+        let mut state = vec![Duals::constant(f64::NAN); M::State::LEN];
+        self.model.initial(&u, &p, &mut state);
+        state.iter().map(|x| !(x.value.is_nan() && x.slopes == [0.0; COLUMNS])).collect()
     }
 
     fn identity(&self) -> String {
@@ -143,6 +155,10 @@ impl<S: Scalar> Functions<S> for Evaluated {
         self.equations.initial_noise(p, to);
     }
 
+    fn initial(&self, u: &[S], p: &[S], to: &mut [S]) {
+        Functions::initial(&*self.equations, u, p, to);
+    }
+
     fn delay(&self, p: &[S], to: &mut [S]) {
         Functions::delay(&*self.equations, p, to);
     }
@@ -194,6 +210,10 @@ impl ModelCode for Evaluated {
 
     fn late(&self, _p: &[f64]) -> Vec<bool> {
         self.late.clone()
+    }
+
+    fn begins(&self, _p: &[f64]) -> Vec<bool> {
+        self.equations.begins()
     }
 
     /// The equations as they are written to a file.

@@ -9,7 +9,7 @@ mod run;
 mod workspace;
 
 use super::made::of_equations;
-use super::{Coupling, Piece, Prepared, Reached, RunError, Seed, States, Sweep, Visit};
+use super::{Coupling, NoStart, Piece, Prepared, Reached, RunError, Seed, States, Sweep, Visit};
 use crate::engine::{Program, Sampling, Trajectories};
 use crate::equations::Equations;
 use crate::error::{Error, Failure};
@@ -17,8 +17,8 @@ use crate::graph::Untraceable;
 use crate::integrate::Method;
 use crate::interval::Hold;
 use crate::layout::{Kind, Layout};
-use crate::predict::{FreeRun, GivenNoise, Guess, Prediction, Unstable, recurrence};
-use crate::record::{Holds, Record, Time};
+use crate::predict::{FreeRun, GivenNoise, Guess, Prediction, recurrence};
+use crate::record::{Holds, Initial, Record, Time};
 use crate::recurrence::Recurrence;
 pub(crate) use derived::Derived;
 pub(crate) use interleaved::Interleaved;
@@ -64,6 +64,8 @@ struct Key {
     sampling: Sampling,
     seeds: Vec<Seed>,
     purpose: Purpose,
+    /// Whether records begin at rest.
+    at_rest: bool,
 }
 
 /// The functions that a program computes.
@@ -134,12 +136,17 @@ impl Programs {
             Time::Uniform { .. } => Sampling::Uniform,
             Time::Stamps(_) => Sampling::Irregular,
         };
-        let key = Key { holds: record.holds.clone(), sampling, seeds: seeds.to_vec(), purpose };
+        let at_rest = *record.initial_state() == Initial::Steady;
+        let key = Key { holds: record.holds.clone(), sampling, seeds: seeds.to_vec(), purpose, at_rest };
         let mut compiled = self.compiled.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some((_, program)) = compiled.iter().find(|(known, _)| *known == key) {
             return program.clone().ok();
         }
         let recurrence = self.recurrence(&key.holds).ok()?;
+        let recurrence = match at_rest {
+            true => Arc::new(recurrence.started_at_rest(self.equations.layout().parameters.len())),
+            false => recurrence,
+        };
         let is_late = self.equations.late().contains(&true);
         let program = match purpose {
             // How often a dead time cuts an interval differs from one to the next.
@@ -195,8 +202,12 @@ impl Sweep for ProgramSweep<'_> {
         self.plain.prepare(record, parameters)
     }
 
-    fn start(&self, record: &Record, state: &[f64], parameters: &[f64]) -> Result<Reached, Unstable> {
+    fn start(&self, record: &Record, state: &[f64], parameters: &[f64]) -> Result<Reached, NoStart> {
         self.plain.start(record, state, parameters)
+    }
+
+    fn follows(&self, record: &Record, parameters: &[f64]) -> Vec<bool> {
+        self.plain.follows(record, parameters)
     }
 
     fn run(&self, pieces: &[Piece<'_>], seeds: &[Seed], visit: Visit<'_>) -> Vec<Result<Reached, RunError>> {

@@ -2,7 +2,7 @@
 
 mod call;
 
-use super::document::Document;
+use super::document::{Document, State};
 use super::expression::{At, Expression, Operation, Relation, Sign};
 use super::names::{Meaning, Names, function, items, names, order};
 use super::remark::{Remark, Source, nearest};
@@ -25,11 +25,12 @@ pub(super) fn compile(document: &Document, source: &Arc<Source>) -> Result<Equat
     let noise = compiler.levels(document.outputs.iter().map(|one| one.noise.as_ref()), f64::NAN, "the noise", true);
     let initial = document.states.iter().map(|one| one.initial_noise.as_ref());
     let initial_noise = compiler.levels(initial, 0.0, "the initial noise", false);
+    let initial = compiler.begins(document.states.iter().map(State::initial));
     let delay = compiler.levels(document.inputs.iter().map(|one| one.delay.as_ref()), 0.0, "the dead time", false);
     if !compiler.errors.is_empty() {
         return Err(compiler.errors);
     }
-    let roots = Roots { state, output, diffusion, noise, initial_noise, delay };
+    let roots = Roots { state, output, diffusion, noise, initial_noise, initial, delay };
     let made = Equations::complete(layout(document), &compiler.graph, &roots);
     made.map_err(|wrong| vec![Remark::error(source, 0..0, wrong.to_string())])
 }
@@ -139,6 +140,32 @@ impl<'d> Compiler<'d> {
                     expression.whole(),
                     format!("{what} must be finite and not negative"),
                 ));
+            }
+            found.push(id);
+        }
+        found
+    }
+
+    /// The state at the first sample of each state, where one is a function; it depends on parameters, inputs and constants only.
+    fn begins<'e>(&mut self, expressions: impl Iterator<Item = Option<&'e Expression>> + Clone) -> Vec<Id> {
+        if expressions.clone().all(|one| one.is_none()) {
+            return vec![];
+        }
+        let mut found = vec![];
+        for expression in expressions {
+            let Some(expression) = expression else {
+                found.push(self.graph.constant(f64::NAN));
+                continue;
+            };
+            let Some(id) = self.lower(expression) else { continue };
+            let reached = self.graph.reached(&[id]);
+            let mut nodes = self.graph.nodes().iter().zip(reached).filter(|(_, reached)| *reached);
+            let moves =
+                |node: &crate::graph::Node| matches!(node, crate::graph::Node::Leaf(Leaf::State(_) | Leaf::Time));
+            if nodes.any(|(node, _)| moves(node)) {
+                let title =
+                    "the initial state depends on a state or time; it may depend on parameters, inputs and constants";
+                self.errors.push(Remark::error(self.source, expression.whole(), title.to_owned()));
             }
             found.push(id);
         }

@@ -70,6 +70,10 @@ pub(super) fn check(document: &Document, source: &Arc<Source>) -> Vec<Remark> {
                     &said("/s^0.5"),
                 );
             }
+            if let Some(initial) = state.initial() {
+                let found = checker.unit(initial);
+                checker.compare(initial, found, unit, &format!("the initial `{name}`"), &state.quantity.unit);
+            }
             if let Some(initial) = &state.initial_noise {
                 let found = checker.unit(initial);
                 let what = format!("the initial noise of `{name}`");

@@ -57,11 +57,14 @@ pub(super) struct NamedTable {
 }
 
 /// What is known of a state at the first sample.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub(super) enum Begin {
     Estimated,
     FirstSample,
+    Steady,
     Given(Parameter),
+    /// A function of parameters and inputs.
+    Said(Expression),
 }
 
 #[derive(Clone, Debug)]
@@ -73,6 +76,16 @@ pub(super) struct State {
     pub diffusion: Option<Expression>,
     /// Standard deviation at the first sample.
     pub initial_noise: Option<Expression>,
+}
+
+impl State {
+    /// The state at the first sample, where it is a function.
+    pub fn initial(&self) -> Option<&Expression> {
+        match &self.begin {
+            Some((Begin::Said(initial), _)) => Some(initial),
+            _ => None,
+        }
+    }
 }
 
 #[derive(Clone, Debug)]

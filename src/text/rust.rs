@@ -215,7 +215,8 @@ impl Module<'_> {
         let outputs: Vec<_> =
             document.outputs.iter().map(|one| (one.quantity.name.as_str(), Some(&one.value))).collect();
         self.function(&mut text, ("output", "Output", full), &outputs, "");
-        let of_parameters = "_p: &Of<Self::Parameters, S>";
+        let (of_parameters, of_first) =
+            ("_p: &Of<Self::Parameters, S>", "_u: &Of<Self::Input, S>, _p: &Of<Self::Parameters, S>");
         let mut levels =
             |signature: (&str, &str, &str), entries: Vec<(&Declared, Option<&Expression>)>, unsaid: &str| {
                 let entries: Vec<_> = entries.into_iter().map(|(one, level)| (one.name.as_str(), level)).collect();
@@ -229,6 +230,8 @@ impl Module<'_> {
         let noise = document.outputs.iter().map(|one| (&one.quantity, one.noise.as_ref()));
         levels(("noise", "Output", full), noise.collect(), "S::from(f64::NAN)");
         let initial = states().map(|one| (&one.quantity, one.initial_noise.as_ref()));
+        let begin = states().map(|one| (&one.quantity, one.initial()));
+        levels(("initial", "State", of_first), begin.collect(), "S::from(f64::NAN)");
         levels(("initial_noise", "State", of_parameters), initial.collect(), "S::from(0.0)");
         let delay = document.inputs.iter().map(|one| (&one.quantity, one.delay.as_ref()));
         levels(("delay", "Input", of_parameters), delay.collect(), "S::from(0.0)");

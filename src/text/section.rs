@@ -33,6 +33,11 @@ impl From<&Model> for Section {
         let diffusion = document.states.iter().map(|one| ("diffusion", &one.quantity, &one.diffusion));
         let noise = document.outputs.iter().map(|one| ("noise", &one.quantity, &one.noise));
         let initial = document.states.iter().map(|one| ("initial noise", &one.quantity, &one.initial_noise));
+        for state in &document.states {
+            if let Some(initial) = state.initial() {
+                rows.push((format!("{}(0)", state.quantity.name), model.written(initial)));
+            }
+        }
         for (what, quantity, expression) in delays.chain(diffusion).chain(noise).chain(initial) {
             if let Some(expression) = expression {
                 rows.push((format!("{what} of {}", quantity.name), model.written(expression)));

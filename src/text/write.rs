@@ -16,12 +16,12 @@ pub(super) fn file(equations: &Equations, name: &str, parameters: &[Parameter]) 
     let layout = equations.layout();
     check(layout, parameters)?;
     let (shared, table) = (free_word(layout, "_"), free_word(layout, "table"));
-    let Roots { state, output, diffusion, noise, initial_noise, delay } = equations.roots();
-    let counts = [state, output, diffusion, noise, initial_noise, delay].map(Vec::len);
+    let Roots { state, output, diffusion, noise, initial_noise, initial, delay } = equations.roots();
+    let counts = [state, output, diffusion, noise, initial_noise, initial, delay].map(Vec::len);
     let lines = lines(equations, [&shared, &table]);
     let (definitions, roots) = lines.split_at(lines.len() - counts.iter().sum::<usize>());
     let mut rest = roots.iter().map(|(_, text)| text.as_str());
-    let [rates, outputs, diffusion, noise, initial_noise, delay] =
+    let [rates, outputs, diffusion, noise, initial_noise, initial, delay] =
         counts.map(|count| rest.by_ref().take(count).collect::<Vec<&str>>());
 
     let mut file = Writer { text: String::from("greybox = 1\n") };
@@ -44,7 +44,9 @@ pub(super) fn file(equations: &Equations, name: &str, parameters: &[Parameter]) 
     let state = |(i, (one, rate)): (usize, (&'_ Quantity, &&str))| {
         let level =
             |name: &str, of: &[&str]| of.get(i).map_or(String::new(), |level| format!(", {name} = {}", quoted(level)));
-        let levels = level("diffusion", &diffusion) + &level("initial_noise", &initial_noise);
+        let begin = initial.get(i).filter(|initial| **initial != "nan");
+        let begin = begin.map_or(String::new(), |initial| format!(", initial = {}", quoted(initial)));
+        let levels = begin + &level("diffusion", &diffusion) + &level("initial_noise", &initial_noise);
         (one.name.clone(), format!("{{ unit = {}, {key} = {}{levels} }}", unit(one), quoted(rate)))
     };
     file.group("states", layout.states.iter().zip(&rates).enumerate().map(state));

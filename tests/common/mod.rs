@@ -136,6 +136,7 @@ pub fn with_outputs<M: Model>(
     match record.initial_state() {
         Initial::Given(state) => made.initial(M::State::from_fn(|i| state[i])),
         Initial::FirstSample => made.initial_from_first_sample(),
+        Initial::Steady => made.initially_at_rest(),
         Initial::Estimated => made,
     }
 }

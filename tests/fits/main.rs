@@ -24,6 +24,7 @@ mod field;
 mod fleet;
 mod guessed_states;
 mod holds;
+mod initial_functions;
 mod instants;
 mod interval_limits;
 mod judgements;

@@ -92,6 +92,37 @@ fn levels_that_move() {
     }
 }
 
+/// The state at the first sample as an expression, or as that of rest, in each form of the model.
+#[test]
+fn initial_states() {
+    let text = |initial: &str| {
+        format!(
+            "greybox = 1\noutputs = [\"x\"]\n[parameters]\na = {{ start = 0.5 }}\n[inputs]\nu = \"V\"\n\
+             [states]\nx = {{ unit = \"V\", derivative = \"u - a*x\", initial = {initial} }}\nz = {{ derivative = \"x - z\"{} }}",
+            if initial == "\"steady\"" { ", initial = \"steady\"" } else { "" }
+        )
+    };
+    assert_eq!(model(&text("\"steady\"")).initial(), Initial::Steady);
+    let read = model(&text("\"u/a + 1\""));
+    assert_eq!(read.initial(), Initial::Estimated);
+    let begin = |of: &Model| {
+        let equations = of.equations();
+        equations.graph().evaluate(&equations.roots().initial, |leaf| if leaf == Leaf::Input(0) { 3.0 } else { 0.5 })
+    };
+    let json: greybox::equations::Equations =
+        serde_json::from_str(&serde_json::to_string(&**read.equations()).unwrap()).unwrap();
+    let again = Model::of(read.equations(), "model", read.parameters()).unwrap();
+    let of_json = Model::of(&json, "model", read.parameters()).unwrap();
+    for of in [&read, &again, &of_json] {
+        let found: Vec<f64> = begin(of);
+        assert!(found[0] == 7.0 && found[1].is_nan(), "{found:?}");
+    }
+    let code = read.to_rust().unwrap();
+    assert!(code.contains("fn initial<S: Scalar>(&self, u: &Of<Self::Input, S>, p: &"), "{code}");
+    let table = greybox::report::Section::from(&read).tables[0].to_string();
+    assert!(table.lines().any(|line| line.split_whitespace().eq(["x(0)", "u/a", "+", "1"])), "{table}");
+}
+
 /// The value of an expression of `x` (0.7), `y` (-1.3), `p` (2) and the time (3).
 fn value(expression: &str) -> f64 {
     let text = format!(

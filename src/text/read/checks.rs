@@ -7,20 +7,40 @@ use crate::text::remark::{Remark, Span};
 use std::collections::{BTreeMap, BTreeSet};
 
 impl Reader {
-    /// The first sample gives all states or none.
+    /// The first sample gives all states or none, all rest or none, and what is a function stands beside no declaration.
     pub(super) fn check_begins(&mut self, states: &[State]) {
-        let first = states.iter().find_map(|state| state.begin.as_ref().filter(|begin| begin.0 == Begin::FirstSample));
-        let other = states.iter().find(|state| !matches!(state.begin, Some((Begin::FirstSample, _))));
-        if let Some(((_, at), other)) = first.zip(other) {
-            let name = &other.quantity.name;
-            let remark = Remark::error(
-                &self.values.source,
-                at.clone(),
-                format!("the first sample gives this state, but not `{name}`"),
-            );
-            let help = "write `initial = \"first\"` at all states, or give each a number or `{ start = ... }`";
-            let remark = remark.and_at(other.quantity.at.clone(), "this one");
-            self.values.errors.push(remark.help(help.to_owned()));
+        type Kind = fn(Option<&Begin>) -> bool;
+        let all: [(Kind, Kind, &str, &str); 3] = [
+            (
+                |begin| matches!(begin, Some(Begin::FirstSample)),
+                |begin| !matches!(begin, Some(Begin::FirstSample)),
+                "the first sample gives this state, but not",
+                "write `initial = \"first\"` at all states, or give each a number or `{ start = ... }`",
+            ),
+            (
+                |begin| matches!(begin, Some(Begin::Steady)),
+                |begin| !matches!(begin, Some(Begin::Steady)),
+                "this state is that of rest, but not",
+                "write `initial = \"steady\"` at all states, or give each a number or `{ start = ... }`",
+            ),
+            (
+                |begin| matches!(begin, Some(Begin::Said(_))),
+                |begin| matches!(begin, Some(Begin::Given(_))),
+                "this state is an expression, but a declaration is that of",
+                "declare a parameter, and name it in `initial`: `initial = \"x0\"`",
+            ),
+        ];
+        for (is_one, is_other, title, help) in all {
+            let kind = |state: &&State, is: Kind| is(state.begin.as_ref().map(|begin| &begin.0));
+            let one = states.iter().find(|state| kind(state, is_one)).and_then(|state| state.begin.as_ref());
+            let other = states.iter().find(|state| kind(state, is_other));
+            if let Some(((_, at), other)) = one.zip(other) {
+                let name = &other.quantity.name;
+                let remark = Remark::error(&self.values.source, at.clone(), format!("{title} `{name}`"));
+                let remark = remark.and_at(other.quantity.at.clone(), "this one");
+                self.values.errors.push(remark.help(help.to_owned()));
+                return;
+            }
         }
     }
 

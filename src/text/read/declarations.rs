@@ -78,7 +78,7 @@ impl Reader {
         Some(parameter)
     }
 
-    /// `"estimated"`, `"first"`, a known number, or a declaration as of a parameter.
+    /// `"estimated"`, `"first"`, `"steady"`, a known number, an expression, or a declaration as of a parameter.
     pub(super) fn begin(&mut self, entry: &Entry<'_>) -> Option<Begin> {
         match entry.value {
             DeValue::Table(_) => {
@@ -90,14 +90,17 @@ impl Reader {
                 );
                 Some(Begin::Given(self.declaration(entry, &fields, "the initial state")?))
             }
-            DeValue::String(_) => {
-                let which = self.choice(Some(entry), "initial state", &["estimated", "first"], None)?;
-                Some([Begin::Estimated, Begin::FirstSample][which].clone())
-            }
+            DeValue::String(text) => match text.trim() {
+                "estimated" => Some(Begin::Estimated),
+                "first" => Some(Begin::FirstSample),
+                "steady" => Some(Begin::Steady),
+                _ => Some(Begin::Said(self.values.expression(entry)?)),
+            },
             DeValue::Integer(_) | DeValue::Float(_) => Some(Begin::Given(fixed(self.values.finite(entry)?))),
             other => {
                 let title = format!(
-                    "`initial` is {}, where a number, \"first\", \"estimated\" or a table should stand",
+                    "`initial` is {}, where a number, an expression, \"first\", \"steady\", \"estimated\" or a table should \
+                     stand",
                     kind(other)
                 );
                 self.values.error(entry.span.clone(), title);
