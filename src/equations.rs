@@ -6,11 +6,13 @@ mod moments;
 mod roots;
 mod slopes;
 mod stored;
+mod terms;
 
 pub(crate) use dead_times::DeadTimes;
 pub(crate) use moments::MomentsOf;
 pub use roots::Roots;
 pub(crate) use slopes::{Jacobian, Slopes};
+pub(crate) use terms::{Term, WithTerms};
 
 use crate::functions::Functions;
 use crate::graph::{Graph, Id, Leaf, Node, Symbol, Untraceable};

@@ -28,6 +28,7 @@ pub use crate::graph::Seed;
 pub use crate::predict::{Guess, Unstable};
 pub use rest::NotAtRest;
 
+use crate::equations::Term;
 use crate::error::{Error, Failure};
 use crate::layout::Layout;
 use crate::predict::GivenNoise;
@@ -125,6 +126,14 @@ pub enum Coupling {
     Affine,
     /// It is some function of it.
     Nonlinear,
+}
+
+/// A sweep of equations with terms that they might lack: each has a further parameter, the factor of it.
+pub struct Lacking<'s> {
+    pub(crate) sweep: Arc<dyn Sweep + 's>,
+    pub(crate) terms: Vec<Term>,
+    /// How many terms more there would be.
+    pub(crate) left_out: usize,
 }
 
 /// Called with each window; returns false to stop.
@@ -289,6 +298,11 @@ pub trait Sweep: Send + Sync {
 
     /// Of a filter of first order, where the model is not affine in its state: the same to the second order.
     fn second_order<'s>(&'s self) -> Option<Arc<dyn Sweep + 's>> {
+        None
+    }
+
+    /// Of a predictor that takes process noise: the same with terms that the equations might lack; `None` where these are not known.
+    fn with_terms<'s>(&'s self) -> Option<Lacking<'s>> {
         None
     }
 

@@ -146,6 +146,8 @@ pub enum WarningCode {
     CoarseStep,
     /// A filter of second order would move an unknown of a fit by the extended one.
     FilterOrder,
+    /// A term that the likelihood asks for in an equation that process noise acts on.
+    MissingTerm,
     /// An oscillation with fewer than 2.5 samples a period, so that one of another frequency gives the same samples.
     Aliased,
     /// Intervals of a search that did not end at a minimum.

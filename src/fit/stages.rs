@@ -23,6 +23,8 @@ const LONGER: f64 = 4.0;
 const MOST: u32 = 16;
 /// The most trial steps of a stage. Most take 5 to 20; the first one from a mass that is 500 times too small takes 70.
 const TRIALS: u64 = 100;
+/// Stages that begin with a longer memory come nearer where the square of the distance is below this part of that before.
+const BETTER: f64 = 0.9;
 /// A simulation follows an output where its error is at most so many times that of the predictions.
 const FOLLOWS: f64 = 1.5;
 /// Predictions do not explain an output where their error is above this part of half the range. A longer memory does so still less.
@@ -197,7 +199,7 @@ impl Stages<'_> {
     }
 
     /// The end of the stages from a start. Where its predictions are not near the measurements, others begin from the start with memories that are
-    /// longer: with a short one, noise hides the parameters. `None` where all fail, or where no simulation from an end is nearer to the measurements
+    /// longer, while they come nearer: with a short one, noise hides the parameters. `None` where all fail, or where no simulation from an end is nearer to the measurements
     /// than one from the start.
     pub fn lead(&self, start: &[f64], control: &Control) -> Option<(Vec<f64>, Led)> {
         let (mut memory, longest) = (self.first_memory(start, control), self.rate.recip());
@@ -206,11 +208,13 @@ impl Stages<'_> {
         loop {
             let (coordinates, led, near) = self.lead_from(start, memory, control);
             evaluations += led.evaluations;
-            if let Some(distance) = self.distance(&coordinates).filter(|distance| *distance < nearest) {
+            let distance = self.distance(&coordinates).unwrap_or(f64::INFINITY);
+            let no_better = found.is_some() && distance > BETTER * nearest;
+            if distance < nearest {
                 (found, nearest) = (Some((coordinates, led)), distance);
             }
-            memory *= LONGER;
-            if near || memory > longest || control.stops() {
+            memory *= LONGER * LONGER;
+            if near || no_better || memory > longest || control.stops() {
                 break;
             }
         }

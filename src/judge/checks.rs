@@ -16,6 +16,7 @@ mod few;
 mod filter_order;
 mod known;
 mod likelihood;
+mod missing_terms;
 mod outliers;
 mod parts;
 mod restarts;
@@ -75,6 +76,7 @@ pub(crate) const CHECKS: &[Check] = &[
     declared::IDENTIFIED,
     step::STEP,
     filter_order::FILTER_ORDER,
+    missing_terms::MISSING_TERMS,
     aliases::ALIASES,
     search::MINIMUM,
     search::STARTS,

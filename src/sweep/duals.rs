@@ -3,7 +3,9 @@
 use super::affine::not_affine;
 use super::failure::FailureSearch;
 use super::filtered::Filter;
-use super::{ModelCode, NoStart, Piece, Prepared, Reached, RunError, Seed, States, Sweep, Visit, unmoved};
+use super::made::of_equations;
+use super::{Lacking, ModelCode, NoStart, Piece, Prepared, Reached, RunError, Seed, States, Sweep, Visit, unmoved};
+use crate::equations::WithTerms;
 use crate::error::{Error, Failure};
 use crate::functions::delays;
 use crate::graph::Choices;
@@ -196,6 +198,12 @@ impl Sweep for DualSweep<'_> {
             predictor: Arc::new(FreeRun),
             uncompiled: self.uncompiled.clone(),
         }))
+    }
+
+    fn with_terms<'s>(&'s self) -> Option<Lacking<'s>> {
+        let WithTerms { equations, terms, left_out } = self.code.equations()?.with_terms();
+        let sweep = of_equations(&Arc::new(equations), &self.method, &self.predictor).ok()?;
+        Some(Lacking { sweep, terms, left_out })
     }
 
     fn second_order<'s>(&'s self) -> Option<Arc<dyn Sweep + 's>> {

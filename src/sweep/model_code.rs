@@ -43,6 +43,11 @@ pub(crate) trait ModelCode: Send + Sync {
     /// Which states the model says at the first sample.
     fn begins(&self, p: &[f64]) -> Vec<bool>;
 
+    /// The equations, where they are evaluated from a graph.
+    fn equations(&self) -> Option<&Equations> {
+        None
+    }
+
     /// Text that identifies the equations.
     fn identity(&self) -> String;
 }
@@ -214,6 +219,10 @@ impl ModelCode for Evaluated {
 
     fn begins(&self, _p: &[f64]) -> Vec<bool> {
         self.equations.begins()
+    }
+
+    fn equations(&self) -> Option<&Equations> {
+        Some(&self.equations)
     }
 
     /// The equations as they are written to a file.

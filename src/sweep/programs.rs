@@ -9,9 +9,9 @@ mod run;
 mod workspace;
 
 use super::made::of_equations;
-use super::{Coupling, NoStart, Piece, Prepared, Reached, RunError, Seed, States, Sweep, Visit};
+use super::{Coupling, Lacking, NoStart, Piece, Prepared, Reached, RunError, Seed, States, Sweep, Visit};
 use crate::engine::{Program, Sampling, Trajectories};
-use crate::equations::Equations;
+use crate::equations::{Equations, WithTerms};
 use crate::error::{Error, Failure};
 use crate::graph::Untraceable;
 use crate::integrate::Method;
@@ -287,6 +287,12 @@ impl Sweep for ProgramSweep<'_> {
         let predictor: Arc<dyn Prediction> = Arc::new(noise.clone());
         let sweep: Arc<dyn Sweep> = of_equations(&self.programs.equations, &self.programs.method, &predictor).ok()?;
         Some(sweep)
+    }
+
+    fn with_terms<'s>(&'s self) -> Option<Lacking<'s>> {
+        let WithTerms { equations, terms, left_out } = self.programs.equations.with_terms();
+        let sweep = of_equations(&Arc::new(equations), &self.programs.method, &self.programs.predictor).ok()?;
+        Some(Lacking { sweep, terms, left_out })
     }
 
     fn second_order<'s>(&'s self) -> Option<Arc<dyn Sweep + 's>> {

@@ -8,6 +8,7 @@ mod given_noise;
 #[path = "../common/hardening.rs"]
 mod hardening;
 mod initial;
+mod missing_terms;
 mod moving_levels;
 mod second_order;
 mod simulated;
