@@ -267,7 +267,7 @@ pub trait Sweep: Send + Sync {
         None
     }
 
-    /// Of predictions that restart from measured states: the simulation by the same equations and method.
+    /// Of predictions that measurements correct: the simulation by the same equations and method.
     fn simulating<'s>(&'s self) -> Option<Arc<dyn Sweep + 's>> {
         None
     }

@@ -148,6 +148,8 @@ pub enum WarningCode {
     FilterOrder,
     /// A term that the likelihood asks for in an equation that process noise acts on.
     MissingTerm,
+    /// Parameters of a filter with which a simulation is far worse than the predictions.
+    SimulatesWorse,
     /// An oscillation with fewer than 2.5 samples a period, so that one of another frequency gives the same samples.
     Aliased,
     /// Intervals of a search that did not end at a minimum.

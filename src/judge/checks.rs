@@ -25,6 +25,7 @@ mod search;
 mod sensors;
 mod shape;
 mod signals_before;
+mod simulates;
 mod step;
 mod suspicions;
 #[cfg(test)]
@@ -77,6 +78,7 @@ pub(crate) const CHECKS: &[Check] = &[
     step::STEP,
     filter_order::FILTER_ORDER,
     missing_terms::MISSING_TERMS,
+    simulates::SIMULATES,
     aliases::ALIASES,
     search::MINIMUM,
     search::STARTS,

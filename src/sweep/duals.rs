@@ -189,7 +189,9 @@ impl Sweep for DualSweep<'_> {
     }
 
     fn simulating<'s>(&'s self) -> Option<Arc<dyn Sweep + 's>> {
-        self.predictor.restarts()?;
+        if self.predictor.is_simulation() {
+            return None;
+        }
         let (layout, code, method) = (self.layout.clone(), self.code.clone(), self.method.clone());
         Some(Arc::new(DualSweep {
             layout,

@@ -12,5 +12,6 @@ mod missing_terms;
 mod moving_levels;
 mod second_order;
 mod simulated;
+mod simulates;
 mod smoothed;
 mod walls;
