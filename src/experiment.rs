@@ -154,6 +154,11 @@ impl<X: Signals, U: Signals, Y: Signals> Experiment<X, U, Y> {
         self.map(|record| Record { initial, ..record })
     }
 
+    /// Has the state at the first sample estimated, also where the model says it ([`Model::initial`]).
+    pub fn initial_estimated(self) -> Self {
+        self.map(|record| Record { initial: Initial::Free, ..record })
+    }
+
     /// Takes the state at the first sample from its outputs, as exact. Noise of that one sample then enters the whole
     /// simulation; the default estimates the state instead.
     pub fn initial_from_first_sample(self) -> Self {

@@ -40,6 +40,8 @@ pub enum Initial {
     /// It is what the model says ([`Model::initial`](crate::Model::initial)); a state that it does not say is estimated, starting from the first measurement of each output, and from zero where that does not determine it.
     #[default]
     Estimated,
+    /// It is estimated in the same way, also where the model says it: so begins a piece of a record that is not its first.
+    Free,
     /// It is what the first sample says, taken as exact.
     FirstSample,
     /// The plant rests at the first sample, under the inputs there: the state whose derivative is zero (continuous), or that the next sample does

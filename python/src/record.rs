@@ -100,7 +100,7 @@ impl Start {
     fn initial(&self) -> PyResult<Initial> {
         match self {
             Start::Given(given) => Ok(Initial::Given(given.iter().map(|one| one.0).collect())),
-            Start::Named(name) if name == "estimated" => Ok(Initial::Estimated),
+            Start::Named(name) if name == "estimated" => Ok(Initial::Free),
             Start::Named(name) if name == "first" => Ok(Initial::FirstSample),
             Start::Named(name) if name == "steady" => Ok(Initial::Steady),
             Start::Named(name) => Err(raised(format!(
@@ -188,7 +188,8 @@ impl Record {
         };
         let holds: BTreeMap<String, &str> = record.inputs().iter().enumerate().map(hold).collect();
         let initial = match record.initial_state() {
-            Initial::Estimated => "estimated".into_pyobject(py)?.into_any(),
+            Initial::Estimated => py.None().into_bound(py),
+            Initial::Free => "estimated".into_pyobject(py)?.into_any(),
             Initial::FirstSample => "first".into_pyobject(py)?.into_any(),
             Initial::Steady => "steady".into_pyobject(py)?.into_any(),
             Initial::Given(given) => given.iter().map(|one| Parameter(*one)).collect::<Vec<_>>().into_pyobject(py)?,

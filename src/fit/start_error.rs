@@ -45,7 +45,8 @@ pub(super) fn start_error(objective: &Objective<'_>, coordinates: &[f64], error:
 fn taken_from_outputs(objective: &Objective<'_>, e: usize, coordinates: &[f64]) -> Option<Failure> {
     let problem = objective.problem;
     let fails = |x: &[f64]| !objective.cost_of(e, x).is_ok_and(f64::is_finite);
-    if *problem.records[e].initial_state() != Initial::Estimated || !fails(coordinates) {
+    let estimated = matches!(problem.records[e].initial_state(), Initial::Estimated | Initial::Free);
+    if !estimated || !fails(coordinates) {
         return None;
     }
     let taken = |i: &usize| {

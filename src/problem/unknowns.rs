@@ -291,7 +291,7 @@ impl InitialState {
                 let x = sweep.measured_state(record, 0, &p).map_err(|reason| unknown(reason, remedy))?;
                 Ok(known(x.into_iter().map(fixed).collect()))
             }
-            Initial::Estimated | Initial::Steady => {
+            Initial::Estimated | Initial::Free | Initial::Steady => {
                 let remedy = "give a start for it with Experiment::initial";
                 let guess = sweep.guessed_state(record, &p).map_err(|reason| unknown(reason, remedy))?;
                 let (Guess { state, open, sizes }, follows) = (guess, sweep.follows(record, &p));

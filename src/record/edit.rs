@@ -185,7 +185,8 @@ impl Record {
     /// The samples of a range that the record has, and that is long enough, under a name of their own.
     pub(super) fn piece(&self, samples: Range<usize>, name: String) -> Self {
         let initial = match &self.initial {
-            Initial::Given(_) if samples.start > 0 => Initial::Estimated,
+            initial @ (Initial::FirstSample | Initial::Free) => initial.clone(),
+            _ if samples.start > 0 => Initial::Free,
             initial => initial.clone(),
         };
         let part = |channel: &Channel| channel.part(samples.clone());

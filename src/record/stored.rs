@@ -52,6 +52,7 @@ impl Serialize for Values<'_> {
 #[serde(rename = "Initial")]
 enum StoredInitial {
     Estimated,
+    Free,
     FirstSample,
     Steady,
     Given(Entries<Parameter>),
@@ -61,6 +62,7 @@ impl StoredInitial {
     fn of(initial: &Initial, states: &[Quantity]) -> Self {
         match initial {
             Initial::Estimated => StoredInitial::Estimated,
+            Initial::Free => StoredInitial::Free,
             Initial::FirstSample => StoredInitial::FirstSample,
             Initial::Steady => StoredInitial::Steady,
             Initial::Given(given) => {
@@ -73,6 +75,7 @@ impl StoredInitial {
     fn into_initial(self, states: &[Quantity]) -> Result<Initial, String> {
         let given = match self {
             StoredInitial::Estimated => return Ok(Initial::Estimated),
+            StoredInitial::Free => return Ok(Initial::Free),
             StoredInitial::FirstSample => return Ok(Initial::FirstSample),
             StoredInitial::Steady => return Ok(Initial::Steady),
             StoredInitial::Given(given) => given,

@@ -111,7 +111,7 @@ impl Sweep for DualSweep<'_> {
         match record.initial_state() {
             Initial::Steady => vec![true; self.layout.states.len()],
             Initial::Estimated => self.code.begins(parameters),
-            Initial::FirstSample | Initial::Given(_) => vec![false; self.layout.states.len()],
+            Initial::Free | Initial::FirstSample | Initial::Given(_) => vec![false; self.layout.states.len()],
         }
     }
 

@@ -138,6 +138,7 @@ pub fn with_outputs<M: Model>(
         Initial::FirstSample => made.initial_from_first_sample(),
         Initial::Steady => made.initially_at_rest(),
         Initial::Estimated => made,
+        Initial::Free => made.initial_estimated(),
     }
 }
 

@@ -197,6 +197,19 @@ fn records_share_an_initial_state() {
     let states = [0, 1].map(|e| found.experiments[e].initial_state.i);
     assert_eq!(states[0], found.parameters.i0);
     assert!(found.unknowns.len() == 2 && (states[1] - 5.0).abs() < 0.2, "{found}");
+    // A piece that begins later has a state of its own.
+    let whole = coil(60, 3.0, 0.1, 7);
+    let (begin, rest) = whole.split_at(30.0).unwrap();
+    let found = Fit::new(&Coil, &[begin, rest]).parameters(start).noise(Current { i: 0.1 }).run().unwrap();
+    let names: Vec<&str> = found.unknowns.iter().map(|unknown| unknown.name.as_str()).collect();
+    assert!(
+        names.len() == 2 && names[0] == "i0" && names[1].starts_with("i(0) [") && names[1].contains("part 2"),
+        "{names:?}"
+    );
+    let estimated = whole.initial_estimated();
+    let start = Recursion { i0: fixed(3.0), a: free(0.9), ..start };
+    let found = Fit::new(&Coil, &estimated).parameters(start).noise(Current { i: 0.1 }).run().unwrap();
+    assert_eq!(found.unknowns.len(), 2);
 }
 
 /// A plant that rests anywhere, and one that rests nowhere, are refused by the name of the state.
