@@ -129,6 +129,7 @@ pub enum Coupling {
 }
 
 /// A sweep of equations with terms that they might lack: each has a further parameter, the factor of it.
+#[derive(Clone)]
 pub struct Lacking<'s> {
     pub(crate) sweep: Arc<dyn Sweep + 's>,
     pub(crate) terms: Vec<Term>,
@@ -267,8 +268,9 @@ pub trait Sweep: Send + Sync {
         None
     }
 
-    /// Of predictions that measurements correct: the simulation by the same equations and method.
-    fn simulating<'s>(&'s self) -> Option<Arc<dyn Sweep + 's>> {
+    /// Of predictions that measurements correct: the simulation by the same equations and method, to run so many samples.
+    fn simulating<'s>(&'s self, samples: usize) -> Option<Arc<dyn Sweep + 's>> {
+        let _ = samples;
         None
     }
 

@@ -5,7 +5,7 @@ use crate::graph::{Function, Graph, Id, Leaf};
 use crate::layout::Quantity;
 
 /// Terms that are added at the most: each is a column of slopes.
-pub(crate) const MOST_TERMS: usize = 16;
+const MOST_TERMS: usize = 16;
 
 /// A term that a state's derivative (next state) might lack.
 #[derive(Clone, Debug, PartialEq)]
@@ -67,7 +67,7 @@ impl Equations {
         let number = |i: usize| u32::try_from(i).unwrap_or(u32::MAX);
         let disturbed =
             |i: &usize| self.roots.diffusion.get(*i).is_some_and(|level| self.graph.known(*level) != Some(0.0));
-        let disturbed: Vec<usize> = (0..self.layout.states.len()).filter(disturbed).collect();
+        let disturbed: Vec<usize> = (0..self.roots.state.len()).filter(disturbed).collect();
         let states = self.layout.states.iter().enumerate().map(|(j, one)| (Leaf::State(number(j)), one));
         let inputs = self.layout.inputs.iter().enumerate().map(|(j, one)| (Leaf::Input(number(j)), one));
         let all: Vec<(Leaf, &Quantity)> = states.chain(inputs).collect();

@@ -22,7 +22,7 @@ impl Problem<'_> {
         }
         let begin = Instant::now();
         let finest = self.by_number(found.method.refinement);
-        let sweep = finest.sweep.simulating().filter(|_| finest.sweep.restarts().is_some())?;
+        let sweep = finest.sweep.simulating(usize::MAX).filter(|_| finest.sweep.restarts().is_some())?;
         let settings = Settings { checkpoint: None, searches: SearchPlan::Single, ..self.settings.clone() };
         let problem = Problem::new(sweep, self.records.clone(), &self.unknowns.parameters, settings).ok()?;
         let start = Start { trials: TRIALS.min(self.settings.optimizer.most()), ..Start::declared(&problem) };

@@ -155,6 +155,9 @@ impl Unknowns {
             NoStart::NotAtRest(NotAtRest { state, rate }) => {
                 let unit = layout.states.get(state).map_or_else(String::new, |state| state.unit.clone());
                 let reason = match rate {
+                    Some(rate) if rate.is_nan() => {
+                        "the equations are undefined where the search for it ends".to_owned()
+                    }
                     Some(rate) => format!("it still changes by {} {unit} per {per}", short(rate)),
                     None => "it rests at any value".to_owned(),
                 };

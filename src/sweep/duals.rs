@@ -3,8 +3,9 @@
 use super::affine::not_affine;
 use super::failure::FailureSearch;
 use super::filtered::Filter;
-use super::made::of_equations;
-use super::{Lacking, ModelCode, NoStart, Piece, Prepared, Reached, RunError, Seed, States, Sweep, Visit, unmoved};
+use super::{
+    Evaluated, Lacking, ModelCode, NoStart, Piece, Prepared, Reached, RunError, Seed, States, Sweep, Visit, unmoved,
+};
 use crate::equations::WithTerms;
 use crate::error::{Error, Failure};
 use crate::functions::delays;
@@ -188,7 +189,7 @@ impl Sweep for DualSweep<'_> {
         Some(Arc::new(DualSweep { layout, code, method, predictor, uncompiled }))
     }
 
-    fn simulating<'s>(&'s self) -> Option<Arc<dyn Sweep + 's>> {
+    fn simulating<'s>(&'s self, _samples: usize) -> Option<Arc<dyn Sweep + 's>> {
         if self.predictor.is_simulation() {
             return None;
         }
@@ -204,8 +205,10 @@ impl Sweep for DualSweep<'_> {
 
     fn with_terms<'s>(&'s self) -> Option<Lacking<'s>> {
         let WithTerms { equations, terms, left_out } = self.code.equations()?.with_terms();
-        let sweep = of_equations(&Arc::new(equations), &self.method, &self.predictor).ok()?;
-        Some(Lacking { sweep, terms, left_out })
+        let (layout, code) = (Arc::new(equations.layout().clone()), Arc::new(Evaluated::new(Arc::new(equations))));
+        let (method, predictor) = (self.method.clone(), self.predictor.clone());
+        let sweep = DualSweep { layout, code, method, predictor, uncompiled: self.uncompiled.clone() };
+        Some(Lacking { sweep: Arc::new(sweep), terms, left_out })
     }
 
     fn second_order<'s>(&'s self) -> Option<Arc<dyn Sweep + 's>> {

@@ -46,6 +46,8 @@ struct Programs {
     compiled: Mutex<Vec<(Key, MaybeCompiled)>>,
     /// This sweep with a finer step, if there is one.
     refined: OnceLock<Option<Arc<Programs>>>,
+    /// The sweep with terms that the equations might lack, made when it is first needed.
+    lacking: OnceLock<Option<Lacking<'static>>>,
 }
 
 /// A program, or the reason why there is none.
@@ -106,7 +108,8 @@ impl Programs {
             None => Coupling::Nonlinear,
         };
         let (recurrences, compiled, refined) = (Mutex::new(vec![]), Mutex::new(vec![]), OnceLock::new());
-        let programs = Programs { equations, method, predictor, coupling, recurrences, compiled, refined };
+        let lacking = OnceLock::new();
+        let programs = Programs { equations, method, predictor, coupling, recurrences, compiled, refined, lacking };
         programs.recurrence(&Holds::All(Hold::Zero))?;
         Ok(programs)
     }
@@ -274,8 +277,11 @@ impl Sweep for ProgramSweep<'_> {
         })
     }
 
-    fn simulating<'s>(&'s self) -> Option<Arc<dyn Sweep + 's>> {
-        let plain = self.plain.simulating()?;
+    fn simulating<'s>(&'s self, samples: usize) -> Option<Arc<dyn Sweep + 's>> {
+        let plain = self.plain.simulating(samples)?;
+        if samples < WORTH_COMPILING {
+            return Some(plain);
+        }
         let (equations, method) = (self.programs.equations.clone(), self.programs.method.clone());
         Some(match ProgramSweep::new(equations, method, Arc::new(FreeRun), plain.clone()) {
             Ok(sweep) => Arc::new(sweep),
@@ -290,9 +296,12 @@ impl Sweep for ProgramSweep<'_> {
     }
 
     fn with_terms<'s>(&'s self) -> Option<Lacking<'s>> {
-        let WithTerms { equations, terms, left_out } = self.programs.equations.with_terms();
-        let sweep = of_equations(&Arc::new(equations), &self.programs.method, &self.programs.predictor).ok()?;
-        Some(Lacking { sweep, terms, left_out })
+        let make = || {
+            let WithTerms { equations, terms, left_out } = self.programs.equations.with_terms();
+            let sweep = of_equations(&Arc::new(equations), &self.programs.method, &self.programs.predictor).ok()?;
+            Some(Lacking { sweep, terms, left_out })
+        };
+        self.programs.lacking.get_or_init(make).clone()
     }
 
     fn second_order<'s>(&'s self) -> Option<Arc<dyn Sweep + 's>> {

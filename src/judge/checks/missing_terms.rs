@@ -5,6 +5,7 @@ use crate::parameter::free;
 use crate::problem::{Free, Noise, Problem, SearchPlan, Settings};
 use crate::sweep::Sweep;
 use statrs::distribution::{ContinuousCDF, Normal};
+use std::collections::HashMap;
 use std::sync::Arc;
 
 pub(crate) const MISSING_TERMS: Check = Check::new(
@@ -31,13 +32,26 @@ const FAR: f64 = 2.0;
 /// A term whose slopes are this part beside those of all unknowns, or less, is one of them.
 const SAME: f64 = 1e-4;
 
-/// A term that the likelihood asks for.
+/// A term that the likelihood is asked about.
 struct Asked {
     term: usize,
     /// Its factor in standard errors of it.
     errors: f64,
     /// The largest move of an unknown, in its standard errors, and which.
-    moves: Option<(f64, usize)>,
+    moved: f64,
+    unknown: usize,
+}
+
+impl Asked {
+    /// What it means, beside so many others.
+    fn severity(&self, terms: usize) -> Severity {
+        match 2.0 * Normal::standard().sf(self.errors) * terms as f64 {
+            ..LEVEL if self.moved >= FAR => Severity::NotUsable,
+            ..LEVEL if self.moved >= CARE => Severity::UsableWithCare,
+            ..LIKELY if self.moved >= FAR => Severity::UsableWithCare,
+            _ => Severity::Usable,
+        }
+    }
 }
 
 fn missing_terms(evidence: &Evidence<'_>, intervals: &Intervals) -> Examined {
@@ -55,17 +69,15 @@ fn missing_terms(evidence: &Evidence<'_>, intervals: &Intervals) -> Examined {
     if made.terms.is_empty() {
         return Examined::from(None);
     }
+    if objective.is_weighted() {
+        return Examined::from(None).without(Some("weighted measurements"));
+    }
     let left_out = (made.left_out > 0).then(|| counted(made.left_out as u64, "term"));
-    let asked = strongest(evidence, intervals, made.sweep, made.terms.len());
-    let count = made.terms.len() as f64;
-    let warning = asked.and_then(|asked| {
-        let ((moved, i), chance) = (asked.moves?, 2.0 * Normal::standard().sf(asked.errors) * count);
-        let warning = match chance {
-            ..LEVEL if moved >= FAR => not_usable,
-            ..LEVEL if moved >= CARE => with_care,
-            ..LIKELY if moved >= FAR => with_care,
-            _ => return None,
-        };
+    let count = made.terms.len();
+    let asked = asked(evidence, intervals, made.sweep, count).into_iter().map(|asked| (asked.severity(count), asked));
+    let told = asked.filter(|(severity, _)| *severity > Severity::Usable);
+    let worst = told.max_by(|(a, one), (b, other)| a.cmp(b).then(one.errors.total_cmp(&other.errors)));
+    let warning = worst.map(|(severity, asked)| {
         let term = &made.terms[asked.term];
         let text = format!(
             "what is taken for process noise of `{}` follows {} ({} standard errors): its equation may lack such a term, with which `{}` would \
@@ -73,21 +85,16 @@ fn missing_terms(evidence: &Evidence<'_>, intervals: &Intervals) -> Examined {
             states[term.state].name,
             term.what,
             number(asked.errors, 2),
-            intervals.unknowns[i].name,
-            number(moved, 2)
+            intervals.unknowns[asked.unknown].name,
+            number(asked.moved, 2)
         );
-        Some(warning(WarningCode::MissingTerm, text))
+        Warning::new(WarningCode::MissingTerm, severity, text).about(About::Unknown(asked.unknown))
     });
     Examined::from(warning).without(left_out)
 }
 
-/// The term that the likelihood asks for the most.
-fn strongest(
-    evidence: &Evidence<'_>,
-    intervals: &Intervals,
-    sweep: Arc<dyn Sweep + '_>,
-    terms: usize,
-) -> Option<Asked> {
+/// What the likelihood says of each term that is told from the unknowns; nothing where its slopes are not known.
+fn asked(evidence: &Evidence<'_>, intervals: &Intervals, sweep: Arc<dyn Sweep + '_>, terms: usize) -> Vec<Asked> {
     let objective = evidence.point.objective;
     let of = objective.problem;
     let first = of.parameters().len();
@@ -99,13 +106,14 @@ fn strongest(
         searches: SearchPlan::Single,
         ..of.settings.clone()
     };
-    let problem = Problem::new(sweep, of.records.clone(), &parameters, settings).ok()?;
+    let Ok(problem) = Problem::new(sweep, of.records.clone(), &parameters, settings) else { return vec![] };
     // Each unknown of the fit is one of this problem, too; the factors of the terms are zero.
-    let same = |a: &Free, b: &Free| a.role == b.role && a.experiment == b.experiment;
+    let key = |free: &Free| (free.role, free.experiment);
+    let known: HashMap<_, usize> = of.unknowns.row.iter().enumerate().map(|(i, free)| (key(free), i)).collect();
     let row = &problem.unknowns.row;
-    let from: Vec<Option<usize>> = row.iter().map(|a| of.unknowns.row.iter().position(|b| same(a, b))).collect();
+    let from: Vec<Option<usize>> = row.iter().map(|free| known.get(&key(free)).copied()).collect();
     let coordinates: Vec<f64> = from.iter().map(|i| i.map_or(0.0, |i| evidence.point.end.coordinates[i])).collect();
-    let linear = problem.in_units(objective.control).evaluate(&coordinates).ok()?;
+    let Ok(linear) = problem.in_units(objective.control).evaluate(&coordinates) else { return vec![] };
     let known = |i: usize| intervals.unknowns[i].knowledge.standard_error();
     let held: Vec<bool> = from.iter().map(|i| i.is_none_or(|i| known(i).is_none())).collect();
     let norms = linear.column_norms();
@@ -124,9 +132,9 @@ fn strongest(
             let change = (step[j] * unknown.transform.slope(unknown.value)).abs();
             Some((change / unknown.knowledge.standard_error()?, (*i)?))
         };
-        let moves = from.iter().enumerate().filter_map(moved).max_by(|a, b| a.0.total_cmp(&b.0));
-        Some(Asked { term: number.checked_sub(first)?, errors: (step[at] / error).abs(), moves })
+        let (moved, unknown) = from.iter().enumerate().filter_map(moved).max_by(|a, b| a.0.total_cmp(&b.0))?;
+        Some(Asked { term: number.checked_sub(first)?, errors: (step[at] / error).abs(), moved, unknown })
     };
     let asked = (0..row.len()).filter(|at| from[*at].is_none()).filter_map(ask);
-    asked.filter(|asked| asked.errors.is_finite()).max_by(|a, b| a.errors.total_cmp(&b.errors))
+    asked.filter(|asked| asked.errors.is_finite() && asked.moved.is_finite()).collect()
 }

@@ -19,7 +19,7 @@ fn simulates(evidence: &Evidence<'_>, _intervals: &Intervals) -> Examined {
     if !objective.sweep.predicts_variance() || objective.problem.layout().states.is_empty() {
         return Examined::from(None);
     }
-    let Some(sweep) = objective.sweep.simulating() else {
+    let Some(sweep) = objective.sweep.simulating(objective.problem.samples()) else {
         return Examined::from(None).without(Some("predictors that have no simulation"));
     };
     let of = objective.problem;
