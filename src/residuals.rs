@@ -17,7 +17,7 @@ use crate::optimize::Infeasible;
 use crate::problem::noise::REPRODUCED;
 use crate::problem::{At, Objective, gather_together};
 use crate::residuals::coupling::Coupled;
-use crate::residuals::first_errors::Errors;
+use crate::residuals::first_errors::{Errors, FirstErrors};
 use crate::residuals::largest::Largest;
 use crate::residuals::modes::StateAt;
 use crate::residuals::powers::{COMPARED, Powers, Scale, parts_by_chance, scales};
@@ -59,6 +59,8 @@ pub(crate) struct Residuals {
     pub parts: f64,
     /// The first errors of the first experiments.
     pub first_errors: Vec<Errors>,
+    /// The same, divided by their predicted deviations; of an experiment without these, empty.
+    pub standardized_errors: Vec<Errors>,
 }
 
 impl Residuals {
@@ -135,8 +137,13 @@ pub(crate) fn residuals_together(points: &[At<'_>]) -> Vec<Option<Residuals>> {
 
 /// Results from the sums of all experiments, and the sum of the squared changes with a finer step.
 fn residuals(objective: &Objective<'_>, coordinates: &[f64], all: &mut [Sums<'_>], step_error: f64) -> Residuals {
-    let first_errors = all.iter_mut().map(|one| std::mem::take(&mut one.first_errors.errors));
-    let first_errors = first_errors.filter(|errors| !errors[0].is_empty()).collect();
+    let first_errors: Vec<FirstErrors> = all
+        .iter_mut()
+        .map(|one| std::mem::replace(&mut one.first_errors, FirstErrors::new(0, 0)))
+        .filter(|first| first.errors.first().is_some_and(|errors| !errors.is_empty()))
+        .collect();
+    let (first_errors, standardized_errors) =
+        first_errors.into_iter().map(|first| (first.errors, first.standardized)).unzip();
     let (all, outputs) = (&*all, objective.outputs());
     let mut sums = vec![OutputSums::default(); outputs];
     let (mut measured, mut log_determinant) = (0, 0.0);
@@ -166,6 +173,7 @@ fn residuals(objective: &Objective<'_>, coordinates: &[f64], all: &mut [Sums<'_>
         shape: (0..all[0].powers.len()).map(shape).collect(),
         parts: parts(all),
         first_errors,
+        standardized_errors,
         outputs: sums.iter().map(OutputSums::fit).collect(),
         levels: sums.iter().map(OutputSums::level).collect(),
         kurtosis: sums.iter().map(OutputSums::kurtosis).collect(),

@@ -10,16 +10,20 @@ const SAMPLES: usize = 16_384;
 /// Errors of an experiment, output by output, sample by sample; `None` where nothing was measured.
 pub(crate) type Errors = Vec<Vec<Option<f64>>>;
 
-/// The first errors of an experiment, in the units of the outputs.
+/// The first errors of an experiment.
 pub(crate) struct FirstErrors {
     /// Windows that begin at this sample or later are left out.
     end: usize,
+    /// In the units of the outputs.
     pub errors: Errors,
+    /// Divided by their predicted deviations; empty where none are predicted.
+    pub standardized: Errors,
 }
 
 impl FirstErrors {
     pub fn new(experiment: usize, outputs: usize) -> Self {
-        FirstErrors { end: if experiment < RECORDS { SAMPLES } else { 0 }, errors: vec![vec![]; outputs] }
+        let (end, none) = (if experiment < RECORDS { SAMPLES } else { 0 }, vec![vec![]; outputs]);
+        FirstErrors { end, errors: none.clone(), standardized: none }
     }
 
     /// Takes a window with its errors, output by output.
@@ -34,10 +38,18 @@ impl FirstErrors {
             };
             kept.extend(errors.iter().enumerate().map(in_units));
         }
+        if !window.has_variances() {
+            return;
+        }
+        for (j, (kept, errors)) in self.standardized.iter_mut().zip(errors.chunks_exact(samples)).enumerate() {
+            let divided = |(k, error): (usize, &f64)| window.is_measured(k, j, lane).then_some(*error);
+            kept.extend(errors.iter().enumerate().map(divided));
+        }
     }
 
     pub fn append(&mut self, later: FirstErrors) {
         self.errors.iter_mut().zip(later.errors).for_each(|(errors, later)| errors.extend(later));
+        self.standardized.iter_mut().zip(later.standardized).for_each(|(errors, later)| errors.extend(later));
     }
 }
 

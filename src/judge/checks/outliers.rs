@@ -51,21 +51,24 @@ fn outliers(evidence: &Evidence<'_>) -> Vec<Warning> {
     let objective = evidence.point.objective;
     let heavy = heavy(evidence);
     let of = |j: usize| {
-        let errors = unsuspected(evidence, j);
-        let all: Vec<f64> = errors.iter().flatten().flatten().copied().collect();
-        dropouts::dropouts_of(evidence, j, &errors).or_else(|| outliers_of(evidence, j, &all))
+        let residuals = &evidence.residuals;
+        let predicted = evidence.point.objective.sweep.predicts_variance();
+        let compared = if predicted { &residuals.standardized_errors } else { &residuals.first_errors };
+        let all: Vec<f64> = unsuspected(evidence, j, compared).into_iter().flatten().flatten().collect();
+        dropouts::dropouts_of(evidence, j, &unsuspected(evidence, j, &residuals.first_errors))
+            .or_else(|| outliers_of(evidence, j, &all))
     };
     let heavy = |j: usize| if heavy[j] { of(j) } else { None };
     (0..objective.outputs()).filter_map(|j| heavy(j).or_else(|| extreme(evidence, j))).collect()
 }
 
 /// The first errors of an output, record by record, without those of samples that the look at its column names.
-fn unsuspected(evidence: &Evidence<'_>, j: usize) -> Vec<Vec<Option<f64>>> {
+fn unsuspected(evidence: &Evidence<'_>, j: usize, first: &[Errors]) -> Vec<Vec<Option<f64>>> {
     let of = |(e, one): (usize, &Errors)| {
         let errors = one[j].iter().enumerate();
         errors.map(|(k, error)| error.filter(|_| !is_named(evidence, e, j, k))).collect()
     };
-    evidence.residuals.first_errors.iter().enumerate().map(of).collect()
+    first.iter().enumerate().map(of).collect()
 }
 
 fn outliers_of(evidence: &Evidence<'_>, j: usize, errors: &[f64]) -> Option<Warning> {
