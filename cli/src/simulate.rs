@@ -6,7 +6,7 @@ use crate::terminal::Terminal;
 use crate::{Failure, Verdict, convert, records};
 use greybox::layout::Layout;
 use greybox::record::Record;
-use greybox::{Fleet, Initial, fixed};
+use greybox::{Fleet, fixed};
 
 pub fn run(one: &Simulate, terminal: &Terminal) -> Result<Verdict, Failure> {
     let model = model(one.model.as_deref(), &one.of_model.constant, terminal)?;
@@ -15,10 +15,7 @@ pub fn run(one: &Simulate, terminal: &Terminal) -> Result<Verdict, Failure> {
     // Outputs need not be in the file.
     let inputs = records::inputs(path, &model, &one.of_records, &one.of_model.initial, terminal)?;
     let mut parameters = declared(&model, &one.of_model)?;
-    let mut initial = match inputs.initial_state() {
-        Initial::Given(given) => given.iter().map(|state| state.start).collect(),
-        _ => vec![0.0; layout.states.len()],
-    };
+    let mut initial = None;
     if let Some(path) = &one.estimate {
         let found = estimate(path)?;
         if found.layout.parameters != layout.parameters {
@@ -32,7 +29,7 @@ pub fn run(one: &Simulate, terminal: &Terminal) -> Result<Verdict, Failure> {
             }
         }
         if let (Some(first), true) = (found.experiments.first(), one.of_model.initial.is_empty()) {
-            initial.clone_from(&first.initial_state);
+            initial = Some(first.initial_state.clone());
         }
     }
     let equations: &greybox::equations::Equations = model.equations();
@@ -40,6 +37,10 @@ pub fn run(one: &Simulate, terminal: &Terminal) -> Result<Verdict, Failure> {
     if let Some(name) = one.integrator.as_deref().or(model.integrator()) {
         fit = fit.integrator_by_name(name)?;
     }
+    let initial = match initial {
+        Some(initial) => initial,
+        None => fit.initial_state(&inputs)?,
+    };
     let simulated = fit.simulate(&initial, &inputs)?;
     let noise = numbers("--noise", &one.noise)?;
     let simulated = if noise.is_empty() { simulated } else { noisy(&simulated, layout, &noise, one.seed)? };

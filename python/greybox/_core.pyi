@@ -63,7 +63,7 @@ class Equations:
     def simulate(
         self,
         parameters: list[float],
-        initial: list[float],
+        initial: list[float | None],
         inputs: Record,
         integrator: str | None,
     ) -> Record: ...

@@ -185,7 +185,7 @@ def simulate(
     parameters : mapping from str to float
         The value of each parameter.
     initial : mapping from str to float, optional
-        The state at the first sample; zero where it is left out.
+        The state at the first sample. One that is left out is as the model says it (``initial``), or zero.
     noise : mapping from str to float, optional
         The standard deviation of white noise that is added to each output; none where it is left out.
     seed : int
@@ -213,7 +213,7 @@ def simulate(
         unknown = [name for name in mapping if name not in known]
         if unknown:
             raise Error(f"{what} names `{unknown[0]}`, and the model has: {near(unknown[0], known)}")
-    start = [float((initial or {}).get(name, 0.0)) for name in states]
+    start = [float(initial[name]) if initial and name in initial else None for name in states]
     record = Record(data, None, time, sample_time, columns, hold).core(equations, "simulation", outputs=False)
     found = equations.core.simulate(values, start, record, integrator)
     if noise:

@@ -91,13 +91,13 @@ impl Equations {
         names(&self.0.layout().parameters)
     }
 
-    /// Simulates with the inputs of a record, and gives it with the outputs.
+    /// Simulates with the inputs of a record, and gives it with the outputs; of a state that is not given, from what the record or the model says.
     #[expect(clippy::needless_pass_by_value, reason = "arguments of Python come as values")]
     fn simulate(
         &self,
         py: Python<'_>,
         parameters: Vec<f64>,
-        initial: Vec<f64>,
+        initial: Vec<Option<f64>>,
         inputs: &Record,
         integrator: Option<&str>,
     ) -> PyResult<Record> {
@@ -106,7 +106,11 @@ impl Equations {
         if let Some(name) = integrator {
             fit = fit.integrator_by_name(name).map_err(raised)?;
         }
-        let simulated = py.detach(|| fit.simulate(&initial, &inputs.record));
+        let simulated = py.detach(|| {
+            let said = if initial.contains(&None) { fit.initial_state(&inputs.record)? } else { vec![] };
+            let state = |(i, given): (usize, &Option<f64>)| given.unwrap_or_else(|| said[i]);
+            fit.simulate(&initial.iter().enumerate().map(state).collect::<Vec<f64>>(), &inputs.record)
+        });
         Ok(Record { record: simulated.map_err(raised)?, equations: self.clone() })
     }
 }

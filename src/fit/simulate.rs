@@ -4,7 +4,7 @@ use super::Fit;
 use super::fittable::Made;
 use crate::equations::Equations;
 use crate::error::Error;
-use crate::layout::Quantity;
+use crate::layout::{Layout, Quantity};
 use crate::parameter::{Parameter, fixed};
 use crate::problem::{Control, Problem, Settings};
 use crate::record::{Channel, Initial, Record};
@@ -18,18 +18,45 @@ impl Fit<'_, Equations> {
     /// # Errors
     /// Other inputs or states than the equations have, an initial state that is not finite; a simulation that fails.
     pub fn simulate(&self, initial: &[f64], inputs: &Record) -> Result<Record, Error> {
-        let layout = self.model.layout();
-        let record = |outputs: Vec<Vec<f64>>| {
-            let channel = |(of, values): (&Quantity, Vec<f64>)| Channel::new(&of.name, &of.unit, values);
-            let outputs = layout.outputs.iter().zip(outputs).map(channel).collect();
-            let record = Record { initial: Initial::Estimated, ..inputs.clone() };
-            record.with_channels(inputs.inputs().to_vec(), outputs)
-        };
         let given = Initial::Given(initial.iter().copied().map(fixed).collect());
-        let unmeasured = record(vec![vec![0.0; inputs.len()]; layout.outputs.len()])?.initial(given)?;
+        let problem = self.of_inputs(inputs, 0.0, given)?;
+        let outputs = problem.in_units(&Control::NEVER).predict(0, &[])?.outputs;
+        with_outputs(self.model.layout(), inputs, outputs)
+    }
+
+    /// The state at the first sample of a record of inputs, as that declares it ([`Initial`]) or the model says it, with the starts of the parameters;
+    /// zero of a state that neither says.
+    ///
+    /// # Errors
+    /// As [`simulate`](Self::simulate); a plant that does not rest where the record begins at rest.
+    pub fn initial_state(&self, inputs: &Record) -> Result<Vec<f64>, Error> {
+        let zero = vec![0.0; self.model.layout().states.len()];
+        let initial = match inputs.initial_state() {
+            Initial::Given(given) => return Ok(given.iter().map(|state| state.start).collect()),
+            Initial::Free | Initial::FirstSample => return Ok(zero),
+            initial => initial.clone(),
+        };
+        let problem = self.of_inputs(inputs, f64::NAN, initial)?;
+        let start = problem.unknowns.start();
+        let values = problem.in_units(&Control::NEVER).values_of(0, &start);
+        let follows = problem.sweep.follows(&problem.records[0], &values.p);
+        Ok(values.x.into_iter().zip(follows).map(|(x, follows)| if follows { x } else { 0.0 }).collect())
+    }
+
+    /// The problem of a record of inputs, whose outputs are this number throughout.
+    fn of_inputs(&self, inputs: &Record, output: f64, initial: Initial) -> Result<Problem<'_>, Error> {
+        let outputs = vec![vec![output; inputs.len()]; self.model.layout().outputs.len()];
+        let record = with_outputs(self.model.layout(), inputs, outputs)?.initial(initial)?;
         let parameters: Vec<Parameter> = self.parameters.iter().map(|parameter| fixed(parameter.start)).collect();
         let sweep = Equations::sweep(self.model.lent(), self.stepping.as_ref(), None)?;
-        let problem = Problem::unchecked(sweep, vec![unmeasured], &parameters, Settings::default())?;
-        record(problem.in_units(&Control::NEVER).predict(0, &[])?.outputs)
+        Problem::unchecked(sweep, vec![record], &parameters, Settings::default())
     }
+}
+
+/// A record of inputs with outputs, its initial state to be estimated.
+fn with_outputs(layout: &Layout, inputs: &Record, outputs: Vec<Vec<f64>>) -> Result<Record, Error> {
+    let channel = |(of, values): (&Quantity, Vec<f64>)| Channel::new(&of.name, &of.unit, values);
+    let outputs = layout.outputs.iter().zip(outputs).map(channel).collect();
+    let record = Record { initial: Initial::Estimated, ..inputs.clone() };
+    record.with_channels(inputs.inputs().to_vec(), outputs)
 }

@@ -231,3 +231,26 @@ fn plants_that_have_no_state_of_rest() {
     let nowhere = refused(1.0, 0.0, 0.0);
     assert!(nowhere.contains("of state `x`"), "{nowhere}");
 }
+
+/// A simulation of equations begins where the model or the record says it, at zero where neither does.
+#[test]
+fn simulations_begin_as_the_model_says() {
+    let of = |says: bool| {
+        let model = Oscillator { says };
+        let record = record(&model, 20, 0.0);
+        let equations = equations::Equations::trace(&model).unwrap();
+        let none: [greybox::record::Record; 0] = [];
+        let parameters = [2.0, 0.4, 0.5, 0.1, 0.1].map(fixed).to_vec();
+        let fit = Fit::new(&equations, &none).parameters(parameters);
+        let begin = |record: &greybox::record::Record| fit.initial_state(record).unwrap();
+        let rest = record.clone().initially_at_rest();
+        let given = record.clone().initial(Motion { x: fixed(0.3), v: free(0.2) });
+        [begin(record.record()), begin(rest.record()), begin(given.record())]
+    };
+    let x = position(3.0, 2.0, 0.5);
+    let [said, rest, given] = of(true);
+    assert!((said[0] / x - 1.0).abs() < 1e-14 && said[1] == 0.0, "{said:?} {x}");
+    assert!((rest[0] / x - 1.0).abs() < 1e-12 && rest[1].abs() < 1e-12, "{rest:?} {x}");
+    assert_eq!(given, [0.3, 0.2]);
+    assert_eq!(of(false)[0], [0.0, 0.0]);
+}
