@@ -99,7 +99,7 @@ fn pieces_keep_the_hold_and_only_the_first_keeps_the_initial_state() {
     let (first, second) = given.split(0.5).unwrap();
     assert_eq!((first.record().input_hold(0), second.record().input_hold(0)), (Hold::First, Hold::First));
     assert!(matches!(first.initial_state(), Initial::Given(given) if given[0].start == 2.0));
-    assert!(matches!(second.initial_state(), Initial::Estimated));
+    assert!(matches!(second.initial_state(), Initial::Free));
     assert!(matches!(given.decimate(2).unwrap().initial_state(), Initial::Given(_)));
     let measured = even(10).initial_from_first_sample();
     assert!(matches!(measured.slice(5..).unwrap().initial_state(), Initial::FirstSample));
