@@ -183,11 +183,12 @@ def test_initial_functions() -> None:
     plain = gb.model(lambda t, x, u, p: [u.u - p.a * x.x], **parts, parameters=["a"])
     record = gb.simulate(plain, frame, parameters={"a": 0.5}, initial={"x": 4.0}, time="t")
     rest = gb.fit(plain, record, a=gb.free(0.8), time="t", initial="steady")
-    assert list(rest.table().index) == ["a"] and rest.parameters.a == pytest.approx(0.5, rel=1e-6)
+    assert rest.table()["name"].tolist() == ["a"] and rest.parameters.a == pytest.approx(0.5, rel=1e-6)
     says = gb.model(lambda t, x, u, p: [u.u - p.a * x.x], initial=lambda u, p: [p.x0 + 0 * u.u], **parts, parameters=["a", "x0"])
     made = gb.simulate(says, frame, parameters={"a": 0.5, "x0": 4.0}, time="t")
     assert np.abs(made["x"] - record["x"]).max() < 1e-12
-    both = gb.fit(says, [record, record], a=gb.free(0.8), x0=gb.free(1.0), time="t")
+    other = gb.simulate(plain, frame.assign(u=0.5 * u), parameters={"a": 0.5}, initial={"x": 4.0}, time="t")
+    both = gb.fit(says, [record, other], a=gb.free(0.8), x0=gb.free(1.0), time="t")
     assert both.parameters.x0 == pytest.approx(4.0, rel=1e-6) and len(both.table()) == 2
     with pytest.raises(gb.Error, match=r"\(u, p\)"):
         gb.model(lambda t, x, u, p: [u.u], initial=lambda p: [p.x0], **parts, parameters=["x0"]).equations()
