@@ -40,7 +40,7 @@ pub enum Initial {
     /// It is what the model says ([`Model::initial`](crate::Model::initial)); a state that it does not say is estimated, starting from the first measurement of each output, and from zero where that does not determine it.
     #[default]
     Estimated,
-    /// It is estimated in the same way, also where the model says it: so begins a piece of a record that is not its first.
+    /// It is estimated in the same way, whatever the model says. Pieces of a record that begin after its first sample are so.
     Free,
     /// It is what the first sample says, taken as exact.
     FirstSample,

@@ -70,7 +70,7 @@ impl Recurrence {
     pub(crate) fn started_at_rest(&self, parameters: usize) -> Self {
         let all = (0..parameters).map(|j| Leaf::Parameter(u32::try_from(j).unwrap_or(u32::MAX)));
         let started = Started { state: all.clone().collect(), ..self.started.clone() };
-        // What depends on a state depends on what that does.
+        // The other entries depend on the state, and so on the parameters that it depends on.
         let rest = started.rest.iter().copied().chain(all).collect();
         self.clone().started(Started { rest, ..started })
     }

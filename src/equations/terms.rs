@@ -24,7 +24,7 @@ pub(crate) struct WithTerms {
     pub left_out: usize,
 }
 
-/// A factor of a term: a quantity, its square with sign, its cube, or its square; one without a quantity.
+/// The function of a quantity that a term is: one, `x`, `x |x|`, `x^3` or `x^2`.
 #[derive(Clone, Copy)]
 enum Shape {
     One,

@@ -8,7 +8,7 @@
 use super::refine::Start;
 use super::search::search;
 use crate::predict::{GivenNoise, Guess};
-use crate::problem::{Control, Noise, Problem, SearchPlan, Settings, noise};
+use crate::problem::{Control, Noise, Problem, Settings, noise};
 use crate::record::{Channel, Record};
 
 /// The least noise of an output, as a part of half its range.
@@ -170,14 +170,7 @@ impl Stages<'_> {
         };
         let sweep = problem.sweep.filtering(&noise)?;
         let optimizer = problem.settings.optimizer.limited(TRIALS);
-        let settings = Settings {
-            noise: Noise::Predicted,
-            checkpoint: None,
-            observers: vec![],
-            searches: SearchPlan::Single,
-            optimizer,
-            ..problem.settings.clone()
-        };
+        let settings = Settings { optimizer, ..problem.settings.beside(Noise::Predicted) };
         let parameters = &problem.unknowns.parameters;
         Problem::new(sweep, problem.records.clone(), parameters, settings).ok()
     }
@@ -198,9 +191,9 @@ impl Stages<'_> {
         memory
     }
 
-    /// The end of the stages from a start. Where its predictions are not near the measurements, others begin from the start with memories that are
-    /// longer, while they come nearer: with a short one, noise hides the parameters. `None` where all fail, or where no simulation from an end is nearer to the measurements
-    /// than one from the start.
+    /// The end of the stages from a start. With a short memory the predictions depend little on the parameters, beside the noise of the measurements:
+    /// where the last predictions are not near these, the stages are repeated from the start with a longer first memory, as long as their end comes
+    /// nearer. `None` where no simulation from an end is nearer to the measurements than one from the start.
     pub fn lead(&self, start: &[f64], control: &Control) -> Option<(Vec<f64>, Led)> {
         let (mut memory, longest) = (self.first_memory(start, control), self.rate.recip());
         let (mut found, mut nearest): (_, f64) = (None, self.distance(start).unwrap_or(f64::INFINITY));

@@ -85,7 +85,7 @@ fn started(equations: &Equations, slopes: Option<&Slopes>, predictor: &dyn Predi
         _ => all.clone(),
     };
     let state = of(equations.graph(), &roots.initial);
-    // What depends on a state depends on what that does.
+    // The other entries depend on the state, and so on the parameters that it depends on.
     Started { states: layout.states.len(), rest: [rest, state.clone()].concat(), state }
 }
 

@@ -70,6 +70,13 @@ impl SearchPlan {
     }
 }
 
+impl Settings {
+    /// Those of a problem beside the fit, with this noise: without its checkpoint, its observers and its further starts.
+    pub(crate) fn beside(&self, noise: Noise) -> Self {
+        Settings { noise, checkpoint: None, observers: vec![], searches: SearchPlan::Single, ..self.clone() }
+    }
+}
+
 impl Default for Settings {
     fn default() -> Self {
         Settings {

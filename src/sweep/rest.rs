@@ -54,7 +54,7 @@ impl Rest {
         };
         let mut x = state.to_vec();
         let (mut f, mut rows) = slopes(&x);
-        // Of the states and steps so far, so that rounding about a state of zero is short, too.
+        // The largest state or step so far: where the state of rest is zero, a step of rounding is short against it.
         let mut longest = 0.0f64;
         for _ in 0..STEPS {
             let Some(Inverse { inverse, units }) = inverse(&rows, &f)? else { return Err(moving(&f)) };
@@ -80,7 +80,8 @@ impl Rest {
         Err(moving(&f))
     }
 
-    /// This state with its slopes with respect to what the parameters are: one more Newton step, in which the slopes of the inverse do not count.
+    /// The state of rest in numbers with slopes: one more Newton step. The slopes of the inverse are left out, since they multiply a rate of zero
+    /// (implicit function theorem).
     pub fn state(&self, filter: &Filter<'_>, record: &Record, delays: &[Option<Duals>], p: &[Duals]) -> Vec<Duals> {
         let between = Between::new(record, 0, delays);
         let x: Vec<Duals> = self.state.iter().map(|x| Dual::constant(*x)).collect();
@@ -94,7 +95,7 @@ impl Rest {
     }
 }
 
-/// The inverse of slopes, and sizes of the states that move the rates alike.
+/// The inverse of the slopes of the rates, and for each state a change that moves the rates by about one of their units.
 struct Inverse {
     inverse: DMatrix<f64>,
     units: Vec<f64>,

@@ -7,7 +7,7 @@ use super::expression::{At, Expression, Operation, Relation, Sign};
 use super::names::{Meaning, Names, function, items, names, order};
 use super::remark::{Remark, Source, nearest};
 use crate::equations::{Equations, Roots};
-use crate::graph::{Function2, Graph, Id, Leaf};
+use crate::graph::{Function2, Graph, Id, Leaf, Node};
 use crate::layout::{Layout, Quantity};
 use crate::scalar::Comparison;
 use std::sync::Arc;
@@ -21,12 +21,14 @@ pub(super) fn compile(document: &Document, source: &Arc<Source>) -> Result<Equat
     let state = all(document.states.iter().map(|one| &one.rate).collect(), &mut compiler);
     let output = all(document.outputs.iter().map(|one| &one.value).collect(), &mut compiler);
     let diffusion = document.states.iter().map(|one| one.diffusion.as_ref());
-    let diffusion = compiler.levels(diffusion, 0.0, "the diffusion", true);
-    let noise = compiler.levels(document.outputs.iter().map(|one| one.noise.as_ref()), f64::NAN, "the noise", true);
+    let diffusion = compiler.levels(diffusion, 0.0, "the diffusion", May::All);
+    let noise = compiler.levels(document.outputs.iter().map(|one| one.noise.as_ref()), f64::NAN, "the noise", May::All);
     let initial = document.states.iter().map(|one| one.initial_noise.as_ref());
-    let initial_noise = compiler.levels(initial, 0.0, "the initial noise", false);
-    let initial = compiler.begins(document.states.iter().map(State::initial));
-    let delay = compiler.levels(document.inputs.iter().map(|one| one.delay.as_ref()), 0.0, "the dead time", false);
+    let initial_noise = compiler.levels(initial, 0.0, "the initial noise", May::Parameters);
+    let initial = document.states.iter().map(State::initial);
+    let initial = compiler.each(initial, f64::NAN, "the initial state", May::Inputs);
+    let delay =
+        compiler.levels(document.inputs.iter().map(|one| one.delay.as_ref()), 0.0, "the dead time", May::Parameters);
     if !compiler.errors.is_empty() {
         return Err(compiler.errors);
     }
@@ -44,6 +46,33 @@ fn layout(document: &Document) -> Layout {
         inputs: document.inputs.iter().map(|one| quantity(&one.quantity)).collect(),
         outputs: document.outputs.iter().map(|one| quantity(&one.quantity)).collect(),
         parameters: document.parameters.iter().map(|one| quantity(&one.quantity)).collect(),
+    }
+}
+
+/// What an expression may depend on, beside constants.
+#[derive(Clone, Copy)]
+enum May {
+    Parameters,
+    /// These and inputs.
+    Inputs,
+    All,
+}
+
+impl May {
+    fn depends_on(self, leaf: Leaf) -> bool {
+        match leaf {
+            Leaf::State(_) | Leaf::Time => matches!(self, May::All),
+            Leaf::Input(_) => !matches!(self, May::Parameters),
+            _ => true,
+        }
+    }
+
+    /// What it depends on in vain, and the remedy.
+    fn sentence(self) -> &'static str {
+        match self {
+            May::Parameters => "a state, an input or time; it may depend on parameters and constants",
+            _ => "a state or time; it may depend on parameters, inputs and constants",
+        }
     }
 }
 
@@ -106,13 +135,33 @@ impl<'d> Compiler<'d> {
         self.errors.push(remark);
     }
 
-    /// One level for each, where one is given; unless it `may_move`, it depends on parameters and constants only.
+    /// One level for each, where one is given, which is not negative.
     fn levels<'e>(
         &mut self,
         expressions: impl Iterator<Item = Option<&'e Expression>> + Clone,
         unsaid: f64,
         what: &str,
-        may_move: bool,
+        may: May,
+    ) -> Vec<Id> {
+        let found = self.each(expressions.clone(), unsaid, what, may);
+        for (expression, id) in expressions.zip(&found) {
+            if let Some(expression) = expression
+                && self.graph.known(*id).is_some_and(|level| !(level >= 0.0 && level.is_finite()))
+            {
+                let title = format!("{what} must be finite and not negative");
+                self.errors.push(Remark::error(self.source, expression.whole(), title));
+            }
+        }
+        found
+    }
+
+    /// One node for each; none where no expression is given.
+    fn each<'e>(
+        &mut self,
+        expressions: impl Iterator<Item = Option<&'e Expression>> + Clone,
+        unsaid: f64,
+        what: &str,
+        may: May,
     ) -> Vec<Id> {
         if expressions.clone().all(|one| one.is_none()) {
             return vec![];
@@ -123,49 +172,13 @@ impl<'d> Compiler<'d> {
                 found.push(self.graph.constant(unsaid));
                 continue;
             };
-            let Some(id) = self.lower(expression) else { continue };
+            // What is wrong is an error already; the number keeps the place.
+            let id = self.lower(expression).unwrap_or_else(|| self.graph.constant(0.0));
             let reached = self.graph.reached(&[id]);
             let mut nodes = self.graph.nodes().iter().zip(reached).filter(|(_, reached)| *reached);
-            let moves = |node: &crate::graph::Node| {
-                matches!(node, crate::graph::Node::Leaf(Leaf::State(_) | Leaf::Input(_) | Leaf::Time))
-            };
-            if !may_move && nodes.any(|(node, _)| moves(node)) {
-                let title =
-                    format!("{what} depends on a state, an input or time; it may depend on parameters and constants");
+            if nodes.any(|(node, _)| matches!(node, Node::Leaf(leaf) if !may.depends_on(*leaf))) {
+                let title = format!("{what} depends on {}", may.sentence());
                 self.errors.push(Remark::error(self.source, expression.whole(), title));
-            }
-            if self.graph.known(id).is_some_and(|level| !(level >= 0.0 && level.is_finite())) {
-                self.errors.push(Remark::error(
-                    self.source,
-                    expression.whole(),
-                    format!("{what} must be finite and not negative"),
-                ));
-            }
-            found.push(id);
-        }
-        found
-    }
-
-    /// The state at the first sample of each state, where one is a function; it depends on parameters, inputs and constants only.
-    fn begins<'e>(&mut self, expressions: impl Iterator<Item = Option<&'e Expression>> + Clone) -> Vec<Id> {
-        if expressions.clone().all(|one| one.is_none()) {
-            return vec![];
-        }
-        let mut found = vec![];
-        for expression in expressions {
-            let Some(expression) = expression else {
-                found.push(self.graph.constant(f64::NAN));
-                continue;
-            };
-            let Some(id) = self.lower(expression) else { continue };
-            let reached = self.graph.reached(&[id]);
-            let mut nodes = self.graph.nodes().iter().zip(reached).filter(|(_, reached)| *reached);
-            let moves =
-                |node: &crate::graph::Node| matches!(node, crate::graph::Node::Leaf(Leaf::State(_) | Leaf::Time));
-            if nodes.any(|(node, _)| moves(node)) {
-                let title =
-                    "the initial state depends on a state or time; it may depend on parameters, inputs and constants";
-                self.errors.push(Remark::error(self.source, expression.whole(), title.to_owned()));
             }
             found.push(id);
         }

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::parameter::free;
-use crate::problem::{Free, Noise, Problem, SearchPlan, Settings};
+use crate::problem::{Free, Noise, Problem};
 use crate::sweep::Sweep;
 use statrs::distribution::{ContinuousCDF, Normal};
 use std::collections::HashMap;
@@ -29,7 +29,7 @@ const LEVEL: f64 = 1e-3;
 const LIKELY: f64 = 1e-2;
 const CARE: f64 = 0.5;
 const FAR: f64 = 2.0;
-/// A term whose slopes are this part beside those of all unknowns, or less, is one of them.
+/// Where the slopes of all unknowns explain those of a term but for this part or less, the data do not tell the two apart.
 const SAME: f64 = 1e-4;
 
 /// A term that the likelihood is asked about.
@@ -99,13 +99,7 @@ fn asked(evidence: &Evidence<'_>, intervals: &Intervals, sweep: Arc<dyn Sweep + 
     let of = objective.problem;
     let first = of.parameters().len();
     let parameters: Vec<_> = of.parameters().iter().copied().chain((0..terms).map(|_| free(0.0))).collect();
-    let settings = Settings {
-        noise: Noise::Predicted,
-        checkpoint: None,
-        observers: vec![],
-        searches: SearchPlan::Single,
-        ..of.settings.clone()
-    };
+    let settings = of.settings.beside(Noise::Predicted);
     let Ok(problem) = Problem::new(sweep, of.records.clone(), &parameters, settings) else { return vec![] };
     // Each unknown of the fit is one of this problem, too; the factors of the terms are zero.
     let key = |free: &Free| (free.role, free.experiment);

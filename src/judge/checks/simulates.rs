@@ -1,7 +1,7 @@
 //! Whether the parameters that a filter found serve a simulation, too.
 
 use super::*;
-use crate::problem::{Control, Noise, Problem, SearchPlan, Settings, noise};
+use crate::problem::{Control, Noise, Problem, noise};
 
 pub(crate) const SIMULATES: Check = Check::new(
     "a simulation predicts as well",
@@ -10,7 +10,7 @@ pub(crate) const SIMULATES: Check = Check::new(
     simulates,
 )
 .costs(&[Pass::Values(1)])
-.levels(&[level("times the error of the predictions", WORSE, "what a disturbed plant shows at once")]);
+.levels(&[level("times the error of the predictions", WORSE, "below, one error says as much as the other")]);
 
 const WORSE: f64 = 1.5;
 
@@ -23,13 +23,7 @@ fn simulates(evidence: &Evidence<'_>, _intervals: &Intervals) -> Examined {
         return Examined::from(None).without(Some("predictors that have no simulation"));
     };
     let of = objective.problem;
-    let settings = Settings {
-        noise: Noise::PerOutput,
-        checkpoint: None,
-        observers: vec![],
-        searches: SearchPlan::Single,
-        ..of.settings.clone()
-    };
+    let settings = of.settings.beside(Noise::PerOutput);
     let Ok(problem) = Problem::new(sweep, of.records.clone(), &of.unknowns.parameters, settings) else {
         return Examined::from(None).without(Some("a simulation, which cannot be made"));
     };
