@@ -84,7 +84,8 @@ pub struct Residuals {
     pub tests: Vec<Test>,
 }
 
-/// Examines the residuals of a prediction of a record, output by output.
+/// Examines the residuals of a prediction of a record, output by output. Those of a filter are in units of their predicted deviations, times the root of
+/// the mean square of these, so that a level of noise that moves is none of the findings; outliers are told in the unit of the output.
 ///
 /// # Errors
 /// A prediction that is not of this record, or a prediction that is infinite. Too few residuals for a test (fewer than
@@ -126,7 +127,8 @@ pub fn examine(prediction: &Simulated, record: &Record) -> Result<Vec<Residuals>
         .outputs()
         .iter()
         .zip(&prediction.residuals)
-        .map(|(channel, residuals)| {
+        .enumerate()
+        .map(|(j, (channel, residuals))| {
             if let Some(k) = residuals.iter().position(|e| e.is_infinite()) {
                 return Err(Error::NotFinite {
                     experiment: record.name().to_owned(),
@@ -136,7 +138,9 @@ pub fn examine(prediction: &Simulated, record: &Record) -> Result<Vec<Residuals>
                     time: record.moment(k),
                 });
             }
-            let output = series(channel, residuals);
+            let standardized = prediction.deviations.get(j).map(|deviations| standardized(residuals, deviations));
+            let tested = standardized.as_ref().unwrap_or(residuals);
+            let output = series(channel, tested);
             let mut result = output.examine(record.name(), &inputs, &outputs, &predicted, &time);
             if result.samples >= FEWEST && output.deviation > 0.0 {
                 if even {
@@ -144,11 +148,22 @@ pub fn examine(prediction: &Simulated, record: &Record) -> Result<Vec<Residuals>
                     (result.spectrum, result.period) = (spectrum, period);
                     result.tests.push(test);
                 }
-                (result.outliers, result.outlier_count) = outliers::find(residuals, &times);
+                (result.outliers, result.outlier_count) = outliers::find(tested, &times);
+                result.outliers.iter_mut().for_each(|one| one.residual = residuals[one.sample as usize]);
             }
             Ok(result)
         })
         .collect()
+}
+
+/// Residuals divided by their deviations, times the root of the mean square of these.
+fn standardized(residuals: &[f64], deviations: &[f64]) -> Vec<f64> {
+    let (sum, count) = deviations
+        .iter()
+        .filter(|deviation| deviation.is_finite())
+        .fold((0.0, 0.0), |(sum, count), deviation| (sum + deviation * deviation, count + 1.0));
+    let level = if count > 0.0 { f64::sqrt(sum / count) } else { 1.0 };
+    residuals.iter().zip(deviations).map(|(residual, deviation)| residual / deviation * level).collect()
 }
 
 /// A signal less its mean, zero where missing.

@@ -15,6 +15,8 @@ pub struct Simulated {
     pub outputs: Vec<Vec<f64>>,
     /// Measured minus predicted; NaN where either is missing.
     pub residuals: Vec<Vec<f64>>,
+    /// Standard deviation that a filter predicts for each residual, in the unit of the output, a column for each output; empty of other predictors.
+    pub deviations: Vec<Vec<f64>>,
     /// The state at the first sample.
     pub initial_state: Vec<f64>,
 }
@@ -35,12 +37,16 @@ impl Objective<'_> {
         let compared = if filters { self.problem.clone() } else { self.problem.against_zero() };
         let objective = self.of(&compared, self.sweep);
         let mut outputs = vec![vec![f64::NAN; record.len()]; measured.len()];
+        let mut deviations = if filters { outputs.clone() } else { vec![] };
         let mut failed = None;
         let result = objective.run_alone(e, coordinates, false, &mut |window| {
             for k in 0..window.samples[0] {
                 for (j, output) in outputs.iter_mut().enumerate() {
                     if window.is_measured(k, j, 0) {
                         let at = window.begin[0] + k;
+                        if let Some(deviations) = deviations.get_mut(j) {
+                            deviations[at] = window.variance(k, j, 0).sqrt();
+                        }
                         output[at] = if filters { measured[j][at] } else { 0.0 } - window.error(k, j, 0);
                         if !output[at].is_finite() {
                             failed = Some(at);
@@ -63,7 +69,8 @@ impl Objective<'_> {
         };
         let residuals = measured.iter().zip(&outputs).map(residual).collect();
         let initial_state = self.values_of(e, coordinates).x;
-        Ok(Simulated { names: names(&self.problem.layout().outputs), outputs, residuals, initial_state })
+        let names = names(&self.problem.layout().outputs);
+        Ok(Simulated { names, outputs, residuals, deviations, initial_state })
     }
 }
 

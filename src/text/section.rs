@@ -1,6 +1,7 @@
 //! The equations of a model as a section of a report.
 
 use super::Model;
+use super::document::Begin;
 use super::expression::Expression;
 use crate::layout::Kind;
 use crate::section::{Cell, Section, Table};
@@ -34,9 +35,12 @@ impl From<&Model> for Section {
         let noise = document.outputs.iter().map(|one| ("noise", &one.quantity, &one.noise));
         let initial = document.states.iter().map(|one| ("initial noise", &one.quantity, &one.initial_noise));
         for state in &document.states {
-            if let Some(initial) = state.initial() {
-                rows.push((format!("{}(0)", state.quantity.name), model.written(initial)));
-            }
+            let initial = match &state.begin {
+                Some((Begin::Said(initial), _)) => model.written(initial),
+                Some((Begin::Steady, _)) => "at rest under the first inputs".to_owned(),
+                _ => continue,
+            };
+            rows.push((format!("{}(0)", state.quantity.name), initial));
         }
         for (what, quantity, expression) in delays.chain(diffusion).chain(noise).chain(initial) {
             if let Some(expression) = expression {

@@ -33,7 +33,13 @@ fn predicted(record: &ExperimentOf<Amplifier>) -> Simulated {
     let run = simulate(&Amplifier, &Gain { k: 2.0 }, &Nothing, record.times().clone(), &inputs).unwrap();
     let residuals = record.outputs().zip(&run.outputs).map(|(measured, y)| measured.y - y.y).collect();
     let outputs = run.outputs.iter().map(|y| y.y).collect();
-    Simulated { names: vec!["y".to_owned()], outputs: vec![outputs], residuals: vec![residuals], initial_state: vec![] }
+    Simulated {
+        names: vec!["y".to_owned()],
+        outputs: vec![outputs],
+        residuals: vec![residuals],
+        deviations: vec![],
+        initial_state: vec![],
+    }
 }
 
 /// The examination of `y = 2 u + disturbance(k, u, w, e)`, `e` a normal number.

@@ -174,6 +174,14 @@ fn a_column_of_deviations_weights_the_samples() {
     let knowledge = &found.unknowns[0].knowledge;
     assert!((knowledge.standard_error().unwrap() / error - 1.0).abs() < 1e-6, "{found} {error}");
     assert!(found.severity() == Severity::Usable, "{found}");
+    // The tests of the residuals see no other size, and no tails, where the sensor is the worse one; outliers are in the unit.
+    let fit = || Fit::new(&model, &record).parameters(Line { a: free(1.0), r: fixed(1.0) }).predictor(Kalman);
+    let prediction = fit().predict(&found, &record).unwrap();
+    let [tested] = &diagnose::residuals::examine(&prediction.columns, record.record()).unwrap()[..] else { panic!() };
+    let least = tested.tests.iter().map(|test| test.p_value).fold(1.0, f64::min);
+    assert!(least > 1e-3 && tested.outlier_count == 0, "{:?}", tested.tests);
+    // All deviations but a fifth are 8.
+    assert!((tested.standard_deviation / f64::sqrt(0.8 * 64.0 + 0.2 * 0.01) - 1.0).abs() < 0.15, "{tested:?}");
 }
 
 /// Noise that is a part of the output, which the estimate finds with the slope: intervals of 95 % cover both in 95 % of 400 records (a binomial

@@ -102,7 +102,10 @@ fn initial_states() {
             if initial == "\"steady\"" { ", initial = \"steady\"" } else { "" }
         )
     };
-    assert_eq!(model(&text("\"steady\"")).initial(), Initial::Steady);
+    let steady = model(&text("\"steady\""));
+    assert_eq!(steady.initial(), Initial::Steady);
+    let table = greybox::report::Section::from(&steady).tables[0].to_string();
+    assert!(table.contains("at rest under the first inputs"), "{table}");
     let read = model(&text("\"u/a + 1\""));
     assert_eq!(read.initial(), Initial::Estimated);
     let begin = |of: &Model| {
