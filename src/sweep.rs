@@ -82,6 +82,18 @@ pub struct Reached {
     pub slopes: Vec<f64>,
 }
 
+impl Reached {
+    /// As it would be after changes of the quantities of the seeds; the slopes stay.
+    pub(crate) fn moved(&self, change: &[f64]) -> Self {
+        let moved = |row: &[f64]| row.iter().zip(change).map(|(s, d)| s * d).sum::<f64>();
+        let rows = self.slopes.chunks_exact(change.len().max(1)).map(moved).chain(std::iter::repeat(0.0));
+        Reached {
+            carry: self.carry.iter().zip(rows).map(|(x, moved)| x + moved).collect(),
+            slopes: self.slopes.clone(),
+        }
+    }
+}
+
 /// Why a piece was not run to its end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RunError {
@@ -346,4 +358,19 @@ fn follow(
         found.push(from.carry.to_vec());
     }
     Ok(found)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Reached;
+
+    /// To the first order: `x + sum s d`; without slopes, and without unknowns, it stays.
+    #[test]
+    fn a_carry_moves_along_its_slopes() {
+        let (carry, slopes) = (vec![1.0, 2.0], vec![1.0, -2.0, 3.0, 0.5]);
+        let reached = Reached { carry: carry.clone(), slopes: slopes.clone() };
+        assert_eq!(reached.moved(&[10.0, 4.0]), Reached { carry: vec![3.0, 34.0], slopes });
+        let plain = Reached { slopes: vec![], ..reached };
+        assert_eq!([plain.moved(&[10.0, 4.0]).carry, plain.moved(&[]).carry], [carry.clone(), carry]);
+    }
 }

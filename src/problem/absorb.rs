@@ -2,6 +2,7 @@
 
 use super::Weighing;
 use super::job::Job;
+use super::likelihood::Likelihood;
 use crate::information::{Block, Information, Triangles};
 use crate::sweep::Window;
 use crate::wide::{self, Task, Wide, Width};
@@ -12,11 +13,11 @@ const ROWS: usize = 256;
 /// Absorbs the rows of jobs that run in parallel lanes.
 pub(super) struct Absorber<'o> {
     weighing: Vec<Weighing<'o>>,
-    /// Whether the cost is the plain sum of squares: no loss, no weights, no predicted variances.
+    /// Whether there is neither a loss nor a weight: the cost is the plain sum of squares, with that of the logarithms of predicted variances.
     plain: bool,
     rows: Vec<u64>,
-    /// Plain sums of squares, lane by lane.
-    squares: Vec<f64>,
+    /// Plain sums, lane by lane.
+    sums: Vec<f64>,
     columns: usize,
     triangles: Option<Triangles>,
     alone: Option<Alone>,
@@ -27,9 +28,9 @@ impl<'o> Absorber<'o> {
         let objective = jobs[0].objective;
         Absorber {
             weighing: jobs.iter().map(|job| Weighing::new(job.objective, job.experiment)).collect(),
-            plain: objective.loss().is_none() && !objective.is_weighted() && !objective.sweep.predicts_variance(),
+            plain: objective.loss().is_none() && !objective.is_weighted(),
             rows: vec![0; jobs.len()],
-            squares: vec![],
+            sums: vec![],
             columns: jobs[0].seeds.len(),
             triangles: None,
             alone: None,
@@ -41,7 +42,12 @@ impl<'o> Absorber<'o> {
         let count = window.len() * window.outputs();
         if self.plain {
             self.count(window);
-            if window.lanes() > 1 {
+            if window.has_variances() {
+                self.sums.resize(window.lanes(), 0.0);
+                let (width, columns, sums) = (window.width, window.columns(), &mut self.sums[..]);
+                let (rows, variances) = window.rows_and_variances_mut();
+                wide::run(width, Likelihood { rows, variances, columns, sums });
+            } else if window.lanes() > 1 {
                 self.square(window);
             }
         } else {
@@ -63,18 +69,19 @@ impl<'o> Absorber<'o> {
     /// Sums of squares of parallel lanes.
     fn square(&mut self, window: &mut Window) {
         let (width, columns) = (window.width, window.columns());
-        self.squares.resize(window.lanes(), 0.0);
-        wide::run(width, Square { rows: window.rows_mut(), columns, squares: &mut self.squares });
+        self.sums.resize(window.lanes(), 0.0);
+        wide::run(width, Square { rows: window.rows_mut(), columns, squares: &mut self.sums });
     }
 
-    /// Counts the measurements.
+    /// Counts the rows of measurements.
     fn count(&mut self, window: &Window) {
-        let outputs = window.outputs();
+        let (outputs, rows_of_each) = (window.outputs(), if window.has_variances() { 2 } else { 1 });
         for (lane, rows) in self.rows.iter_mut().enumerate() {
-            *rows += match window.whole {
-                true => (window.samples[lane] * outputs) as u64,
-                false => window.measurements(lane),
-            };
+            *rows += rows_of_each
+                * match window.whole {
+                    true => (window.samples[lane] * outputs) as u64,
+                    false => window.measurements(lane),
+                };
         }
     }
 
@@ -104,11 +111,12 @@ impl<'o> Absorber<'o> {
 
     /// Cost and triangle of a job.
     pub fn part(&mut self, lane: usize) -> (f64, Information) {
-        let squares = match &self.alone {
-            Some(alone) if self.plain => alone.squares,
-            _ => self.squares.get(lane).copied().unwrap_or(0.0),
+        let sum = match (&self.alone, self.sums.get(lane)) {
+            (_, Some(sum)) => *sum,
+            (Some(alone), None) if self.plain => alone.squares,
+            _ => 0.0,
         };
-        let cost = self.weighing[lane].cost + 0.5 * squares;
+        let cost = self.weighing[lane].cost + 0.5 * sum;
         let triangle = match (&mut self.alone, &self.triangles) {
             (Some(alone), _) => alone.triangle(),
             (None, Some(triangles)) => triangles.triangle(lane),

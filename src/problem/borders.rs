@@ -3,7 +3,7 @@
 use super::batches::{each, in_batches};
 use super::job::Job;
 use super::linearize::Triangulation;
-use super::segments::{Borders, Carries};
+use super::segments::Borders;
 use super::{Objective, Values};
 use crate::optimize::Infeasible;
 use crate::sweep::{Piece, Reached, RunError, Seed};
@@ -73,16 +73,16 @@ impl Objective<'_> {
         let one = |e: usize| {
             let segments = &self.problem.cuts.segments[e];
             if !self.problem.cuts.is_chained(e) {
-                return Ok(Carries::default());
+                return Ok(vec![]);
             }
             let job = self.job(e, &values[e], coordinates, false);
             let at: Vec<usize> = segments[1..].iter().map(|samples| samples.start).collect();
             let found = self.sweep.follow(&job.piece, &at).map_err(|error| self.infeasible(e, error))?;
-            Ok(Carries { values: found.concat(), slopes: vec![] })
+            Ok(found.into_iter().map(|carry| Reached { carry, slopes: vec![] }).collect())
         };
         let of: Result<Vec<_>, Infeasible> = each(self.experiments(), one).into_iter().collect();
         let (point, cost, values) = (coordinates.to_vec(), f64::INFINITY, values.to_vec());
-        Ok(Borders { point, cost, values, of: of?, right: true })
+        Ok(Borders { point, cost, values, of: of?, right: true, run_ins: None })
     }
 
     /// The carry at the begin of each segment.
@@ -102,17 +102,29 @@ impl Objective<'_> {
 
     /// The borders as the slopes at another point tell.
     fn extrapolated(&self, coordinates: &[f64], values: &[Values], from: &Borders) -> Borders {
-        let one = |(e, carries): (usize, &Carries)| {
-            let quantity = |values: &Values, seed: &Seed| match *seed {
-                Seed::Carry(i) => values.x[i],
-                Seed::Parameter(j) => values.p[j],
-            };
-            let change = |seed| quantity(&values[e], seed) - quantity(&from.values[e], seed);
-            let change: Vec<f64> = self.problem.unknowns.seeds(e).iter().map(change).collect();
-            carries.moved(&change)
+        let one = |(e, borders): (usize, &Vec<Reached>)| {
+            let change = self.change(e, values, from);
+            borders.iter().map(|border| border.moved(&change)).collect()
         };
         let of = from.of.iter().enumerate().map(one).collect();
-        Borders { point: coordinates.to_vec(), cost: from.cost, values: values.to_vec(), of, right: false }
+        Borders {
+            point: coordinates.to_vec(),
+            cost: from.cost,
+            values: values.to_vec(),
+            of,
+            right: false,
+            run_ins: None,
+        }
+    }
+
+    /// The change of the quantities of a record's unknowns from another point.
+    pub(super) fn change(&self, e: usize, values: &[Values], from: &Borders) -> Vec<f64> {
+        let quantity = |values: &Values, seed: &Seed| match *seed {
+            Seed::Carry(i) => values.x[i],
+            Seed::Parameter(j) => values.p[j],
+        };
+        let change = |seed| quantity(&values[e], seed) - quantity(&from.values[e], seed);
+        self.problem.unknowns.seeds(e).iter().map(change).collect()
     }
 
     /// Triangles of a nonlinear model from guessed borders, which are corrected and simulated from anew until the correction
@@ -165,17 +177,21 @@ impl Objective<'_> {
         let end = |_: &[usize], jobs: &[&Job<'_>]| {
             let pieces: Vec<Piece<'_>> = jobs.iter().map(|job| job.piece.lent()).collect();
             let reached = self.sweep.run(&pieces, &[], &mut |_| !self.control.stops());
-            let carry = |(reached, piece): (Result<Reached, RunError>, Piece<'_>)| {
-                reached.map_or_else(|_| piece.carry.into_owned(), |reached| reached.carry)
+            let end = |(reached, piece): (Result<Reached, RunError>, Piece<'_>)| {
+                reached.unwrap_or_else(|_| Reached { carry: piece.carry.into_owned(), slopes: vec![] })
             };
-            Ok(reached.into_iter().zip(pieces).map(carry).collect())
+            Ok(reached.into_iter().zip(pieces).map(end).collect())
         };
         let mut ends = in_batches(&jobs, end).unwrap_or_default().into_iter();
-        let carries = |segments: &Vec<_>| {
-            let values = segments[1..].iter().flat_map(|_| ends.next().unwrap_or_default()).collect();
-            Carries { values, slopes: vec![] }
-        };
-        let of = self.problem.cuts.segments.iter().map(carries).collect();
-        Borders { point: coordinates.to_vec(), cost: f64::INFINITY, values: values.to_vec(), of, right: false }
+        let of_record = |segments: &Vec<_>| ends.by_ref().take(segments.len() - 1).collect();
+        let of = self.problem.cuts.segments.iter().map(of_record).collect();
+        Borders {
+            point: coordinates.to_vec(),
+            cost: f64::INFINITY,
+            values: values.to_vec(),
+            of,
+            right: false,
+            run_ins: None,
+        }
     }
 }

@@ -66,10 +66,10 @@ impl Objective<'_> {
         let segments = self.problem.cuts.segments[e].iter().enumerate();
         let job = |(s, samples): (usize, &std::ops::Range<usize>)| {
             let Piece { carry, slopes: own, .. } = &whole.piece;
-            let carries = borders.map(|borders| &borders.of[e]);
-            let slopes = carries.filter(|_| slopes).and_then(|carries| carries.slopes_at(s, own.len())).unwrap_or(own);
-            let carry = carries.and_then(|carries| carries.at(s, carry.len())).unwrap_or(carry).to_vec().into();
-            let slopes = slopes.to_vec().into();
+            let border = borders.and_then(|borders| borders.at(e, s));
+            let there = border.map(|border| &border.slopes[..]).filter(|there| slopes && !there.is_empty());
+            let slopes = there.unwrap_or(own).to_vec().into();
+            let carry = border.map_or(&carry[..], |border| &border.carry).to_vec().into();
             let (seeds, scales) = (whole.seeds.clone(), whole.scales.clone());
             Job {
                 objective: self,

@@ -4,7 +4,7 @@ use super::absorb::Absorber;
 use super::batches::{Broken, in_batches, run};
 use super::borders::Guess;
 use super::job::Job;
-use super::segments::{Borders, Carries};
+use super::segments::Borders;
 use super::{Free, Objective, Role, Values, Weighing};
 use crate::information::{Chain, Information};
 use crate::optimize::{Infeasible, Linearization};
@@ -20,9 +20,9 @@ const FORGOTTEN: f64 = 1e-10;
 
 /// Cost, triangle and final carry of one segment.
 pub(super) struct Part {
-    cost: f64,
-    triangle: Information,
-    reached: Reached,
+    pub cost: f64,
+    pub triangle: Information,
+    pub reached: Reached,
 }
 
 impl Objective<'_> {
@@ -37,25 +37,33 @@ impl Objective<'_> {
 
     fn evaluate_all(&self, coordinates: &[f64]) -> Result<Linearization, Infeasible> {
         let values = self.values(coordinates);
-        let cuts = &self.problem.cuts;
-        let chained = (0..self.experiments()).any(|e| cuts.is_chained(e));
-        let guess = if chained { self.guess(coordinates, &values)? } else { Guess::Right(None) };
-        let found = match guess {
-            Guess::Right(borders) => self.triangles(coordinates, &values, borders.as_ref())?,
-            Guess::Affine(borders, most) => {
-                let found = self.triangles(coordinates, &values, Some(&borders))?;
-                match found.moved > most * 2.0 * found.cost {
-                    true => self.triangles(coordinates, &values, found.borders.as_ref())?,
-                    false => found,
-                }
-            }
-            Guess::Nonlinear(borders, best) => self.repaired(coordinates, &values, borders, best)?,
+        let found = match self.forgetting(coordinates, &values)? {
+            Some(found) => found,
+            None => self.chaining(coordinates, &values)?,
         };
         let Triangulation { cost, blocks, borders, .. } = found;
         if let Some(borders) = borders {
             self.memory.keep(Arc::new(borders));
         }
         Ok(self.with_priors(coordinates, cost, blocks))
+    }
+
+    /// Triangles of segments with slopes with respect to their begins, where these are chained.
+    pub(super) fn chaining(&self, coordinates: &[f64], values: &[Values]) -> Result<Triangulation, Infeasible> {
+        let cuts = &self.problem.cuts;
+        let chained = (0..self.experiments()).any(|e| cuts.is_chained(e));
+        let guess = if chained { self.guess(coordinates, values)? } else { Guess::Right(None) };
+        Ok(match guess {
+            Guess::Right(borders) => self.triangles(coordinates, values, borders.as_ref())?,
+            Guess::Affine(borders, most) => {
+                let found = self.triangles(coordinates, values, Some(&borders))?;
+                match found.moved > most * 2.0 * found.cost {
+                    true => self.triangles(coordinates, values, found.borders.as_ref())?,
+                    false => found,
+                }
+            }
+            Guess::Nonlinear(borders, best) => self.repaired(coordinates, values, borders, best)?,
+        })
     }
 
     /// The linearization of one record that was run uncut.
@@ -155,14 +163,14 @@ impl Objective<'_> {
             }
             whole.scale_columns(&self.problem.unknowns.scales(e, coordinates));
             found.blocks.push(whole);
-            of.push(Carries::default());
+            of.push(vec![]);
         }
         if !found.cost.is_finite() || found.blocks.iter().any(|block| !block.is_finite()) {
             return Err(self.infeasible(0, RunError::Failed { sample: 0 }));
         }
         if guess.is_some() {
             let (point, cost, values) = (coordinates.to_vec(), found.cost, values.to_vec());
-            found.borders = Some(Borders { point, cost, values, of, right: false });
+            found.borders = Some(Borders { point, cost, values, of, right: false, run_ins: None });
         }
         Ok(found)
     }
@@ -234,7 +242,7 @@ impl<'p> Chained<'p> {
     fn jobs<'s>(&'s self, segments: &'s [Range<usize>], guess: Option<&'s Borders>) -> impl Iterator<Item = Job<'s>> {
         let Job { objective, experiment, piece: whole, seeds: unknowns, .. } = &self.whole;
         let job = move |(s, samples): (usize, &Range<usize>)| {
-            let border = guess.and_then(|guess| guess.of[*experiment].at(s, whole.carry.len()));
+            let border = guess.and_then(|guess| guess.at(*experiment, s)).map(|border| &border.carry[..]);
             let mut slopes = Cow::Borrowed(&self.slopes[..]);
             if s == 0 {
                 // A given initial state is constant: slopes with respect to it are not needed, and may be infinite.
@@ -259,7 +267,7 @@ pub(super) struct Triangulation {
     pub cost: f64,
     /// Sum of squares of what the correction of guessed borders changed.
     pub moved: f64,
-    blocks: Vec<Information>,
+    pub blocks: Vec<Information>,
     pub borders: Option<Borders>,
 }
 
@@ -272,30 +280,29 @@ impl Triangulation {
         parts: impl Iterator<Item = Part>,
         guess: Option<&Borders>,
         affine: bool,
-    ) -> Carries {
+    ) -> Vec<Reached> {
         let Job { experiment, scales, piece: Piece { carry, slopes, .. }, .. } = of.whole;
         let carried = carry.len();
         let mut chain = Chain::new(carried, segments, slopes.into_owned(), &of.parameters, &scales);
-        let simulated_from = guess.map(|guess| (&guess.of[experiment], guess.right && !affine));
-        let mut carries = Carries::default();
+        let right = guess.is_some_and(|guess| guess.right && !affine);
+        let mut corrected = vec![];
         let mut simulated = 0.0;
         for (s, part) in parts.enumerate() {
             simulated += part.cost;
             chain.add(&part.triangle);
-            let Some((from, right)) = simulated_from else { continue };
-            if let Some(carry) = from.at(s + 1, carried) {
+            if let Some(Reached { carry, .. }) = guess.and_then(|guess| guess.at(experiment, s + 1)) {
                 chain.go_on(&part.reached.carry, &part.reached.slopes, carry);
                 if right {
                     chain.without_defect();
                 }
                 let (defect, slopes) = chain.begin();
-                carries.values.extend(carry.iter().zip(defect).map(|(carry, defect)| carry + defect));
-                carries.slopes.extend_from_slice(slopes);
+                let carry = carry.iter().zip(defect).map(|(carry, defect)| carry + defect).collect();
+                corrected.push(Reached { carry, slopes: slopes.to_vec() });
             }
         }
         self.moved += chain.moved;
         self.cost += if chain.moved > 0.0 { 0.5 * chain.squares } else { simulated };
         self.blocks.push(chain.triangle());
-        carries
+        corrected
     }
 }

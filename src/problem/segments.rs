@@ -8,7 +8,7 @@
 
 use super::Values;
 use crate::record::Record;
-use crate::sweep::{Coupling, Sweep};
+use crate::sweep::{Coupling, Reached, Sweep};
 use std::ops::Range;
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -56,62 +56,60 @@ fn cut(samples: usize, whole: bool) -> Vec<Range<usize>> {
     (0..segments).map(|s| begin(s)..begin(s + 1)).collect()
 }
 
-/// The carries at the begins of a record's segments, from the second segment on, one after the other; and their slopes with respect to
-/// the quantities of the record's unknowns, row by row. There are no slopes where only values were simulated.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct Carries {
-    pub values: Vec<f64>,
-    pub slopes: Vec<f64>,
-}
-
-impl Carries {
-    /// The carry at the begin of a segment, of `carried` numbers; `None` for the first segment and for one without a known carry.
-    pub fn at(&self, segment: usize, carried: usize) -> Option<&[f64]> {
-        self.values.chunks_exact(carried.max(1)).nth(segment.checked_sub(1)?)
-    }
-
-    /// The slopes of that carry, row by row, `count` numbers.
-    pub fn slopes_at(&self, segment: usize, count: usize) -> Option<&[f64]> {
-        self.slopes.chunks_exact(count.max(1)).nth(segment.checked_sub(1)?)
-    }
-
-    /// The carries as they would be after changes of the quantities of the record's unknowns.
-    pub fn moved(&self, change: &[f64]) -> Self {
-        let moved = |row: &[f64]| row.iter().zip(change).map(|(s, d)| s * d).sum::<f64>();
-        let rows = self.slopes.chunks_exact(change.len().max(1)).map(moved).chain(std::iter::repeat(0.0));
-        Carries { values: self.values.iter().zip(rows).map(|(x, moved)| x + moved).collect(), slopes: vec![] }
-    }
-}
-
 /// The borders between the segments of all records at a point.
 #[derive(Clone, Debug)]
 pub(crate) struct Borders {
     pub point: Vec<f64>,
     pub cost: f64,
     pub values: Vec<Values>,
-    pub of: Vec<Carries>,
+    /// The carries at the begins of each record's segments, from the second segment on, with slopes with respect to the quantities of the record's
+    /// unknowns, row by row; without slopes where only values were simulated.
+    pub of: Vec<Vec<Reached>>,
     /// Whether they need no correction: simulated ones, and those of a point that was evaluated, corrected.
     pub right: bool,
+    /// Of a filter that forgets the begins of segments.
+    pub run_ins: Option<RunIns>,
+}
+
+/// The carries where run-ins begin, with their slopes, for each record.
+#[derive(Clone, Debug)]
+pub(crate) struct RunIns {
+    /// The part of a segment that they take.
+    pub part: usize,
+    pub of: Vec<Vec<Reached>>,
 }
 
 impl Borders {
     pub fn has_slopes(&self) -> bool {
-        self.of.iter().all(|carries| carries.values.is_empty() || !carries.slopes.is_empty())
+        self.of.iter().flatten().all(|border| !border.slopes.is_empty())
+    }
+
+    /// The carry at the begin of a segment; `None` for the first one, and where there is none.
+    pub fn at(&self, experiment: usize, segment: usize) -> Option<&Reached> {
+        self.of[experiment].get(segment.checked_sub(1)?)
     }
 }
 
 /// The borders at the last point that was evaluated, and at the best. A copy is independent of what it was copied from.
 #[derive(Debug, Default)]
-pub(crate) struct Memory(Mutex<[Option<Arc<Borders>>; 2]>);
+pub(crate) struct Memory(Mutex<Points>);
+
+#[derive(Clone, Debug, Default)]
+struct Points {
+    last: Option<Arc<Borders>>,
+    best: Option<Arc<Borders>>,
+    /// How often a filter did not forget the begin of a run-in.
+    remembered: usize,
+}
 
 impl Memory {
-    fn points(&self) -> std::sync::MutexGuard<'_, [Option<Arc<Borders>>; 2]> {
+    fn points(&self) -> std::sync::MutexGuard<'_, Points> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Keeps the borders of a point.
     pub fn keep(&self, borders: Arc<Borders>) {
-        let [last, best] = &mut *self.points();
+        let Points { last, best, .. } = &mut *self.points();
         // Costs with different noise levels cannot be compared; the point is then the same as the best one.
         if best.as_ref().is_none_or(|best| borders.cost <= best.cost || borders.point == best.point) {
             *best = Some(borders.clone());
@@ -122,33 +120,28 @@ impl Memory {
     /// The borders at exactly this point.
     pub fn at(&self, point: &[f64]) -> Option<Arc<Borders>> {
         let same = |a: &[f64]| a.len() == point.len() && a.iter().zip(point).all(|(a, b)| a.to_bits() == b.to_bits());
-        self.points().iter().flatten().find(|borders| same(&borders.point)).cloned()
+        let Points { last, best, .. } = &*self.points();
+        [last, best].into_iter().flatten().find(|borders| same(&borders.point)).cloned()
     }
 
     /// The borders with slopes at the best point.
     pub fn best(&self) -> Option<Arc<Borders>> {
-        self.points()[1].clone().filter(|borders| borders.has_slopes())
+        self.points().best.clone().filter(|borders| borders.has_slopes())
+    }
+
+    /// How often a filter did not forget the begin of a run-in.
+    pub fn remembered(&self) -> usize {
+        self.points().remembered
+    }
+
+    /// A filter did not forget.
+    pub fn remember(&self) {
+        self.points().remembered += 1;
     }
 }
 
 impl Clone for Memory {
     fn clone(&self) -> Self {
         Memory(Mutex::new(self.points().clone()))
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::Carries;
-
-    /// To the first order: `x + sum s d`; without slopes, and without unknowns, they stay.
-    #[test]
-    fn carries_move_along_their_slopes() {
-        let values = vec![1.0, 2.0];
-        let carries = Carries { values: values.clone(), slopes: vec![1.0, -2.0, 3.0, 0.5] };
-        let moved = carries.moved(&[10.0, 4.0]);
-        assert_eq!((moved.values, moved.slopes.len()), (vec![3.0, 34.0], 0));
-        assert_eq!(Carries { slopes: vec![], ..carries.clone() }.moved(&[10.0, 4.0]).values, values);
-        assert_eq!(Carries { slopes: vec![], ..carries }.moved(&[]).values, values);
     }
 }

@@ -5,6 +5,7 @@ use super::job::Job;
 use crate::prefilter::Butterworth;
 use crate::sweep::Window;
 use crate::wide::{self, Task, Wide};
+use std::f64::consts::FRAC_1_SQRT_2;
 
 /// From errors and slopes in the units of the outputs to standardized ones, with respect to the coordinates.
 pub(super) struct Standardize<'s> {
@@ -120,30 +121,57 @@ impl Task for Multiply<'_> {
 /// Standardizes errors by their predicted variances `v`: rows `dy / sqrt(v), z = e / sqrt(v)`, and the slopes of the variances as
 /// `dv / (sqrt(2) v)`, so that with `(z^2 - 1) / sqrt(2)` beside them the least-squares gradient is that of the likelihood.
 fn by_variance(window: &mut Window) -> Result<(), (usize, usize)> {
-    let (lanes, last) = (window.lanes(), window.columns() - 1);
-    for k in 0..window.len() {
-        for j in 0..window.outputs() {
-            for lane in 0..lanes {
-                let number = (k * window.outputs() + j) * lanes + lane;
-                if !window.is_measured(k, j, lane) {
-                    window.log_variances[number] = 0.0;
-                    continue;
+    let (lanes, columns, outputs) = (window.lanes(), window.columns(), window.outputs());
+    for (k, j) in (0..window.len()).flat_map(|k| (0..outputs).map(move |j| (k, j))) {
+        let measured = window.measured(k, j);
+        let variances = window.variance_row(k, j)[(columns - 1) * lanes..].iter().enumerate();
+        let wrong = |(lane, v): &(usize, &f64)| !(**v > 0.0 && v.is_finite()) && measured >> lane & 1 == 1;
+        if let Some((lane, _)) = variances.clone().find(wrong) {
+            return Err((lane, window.begin[lane] + k));
+        }
+    }
+    let width = window.width;
+    let (rows, variances) = window.rows_and_variances_mut();
+    wide::run(width, ByVariance { rows, variances, columns, lanes });
+    Ok(())
+}
+
+/// Divides rows by the roots of variances, and the slopes of these by them; both are zero where nothing was measured.
+struct ByVariance<'v> {
+    rows: &'v mut [f64],
+    variances: &'v mut [f64],
+    columns: usize,
+    lanes: usize,
+}
+
+impl Task for ByVariance<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<W: Wide>(self) {
+        let ByVariance { rows, variances, columns, lanes } = self;
+        let (width, last) = (columns * lanes, (columns - 1) * lanes);
+        let (zero, one) = (W::splat(0.0), W::splat(1.0));
+        for (row, second) in rows.chunks_exact_mut(width).zip(variances.chunks_exact_mut(width)) {
+            for first in (0..lanes - lanes % W::LANES).step_by(W::LANES) {
+                let v = W::load(&second[last + first..]);
+                let v = v.select_eq(zero, one, v);
+                let (root, half) = (one.div(v.sqrt()), W::splat(FRAC_1_SQRT_2).div(v));
+                for at in (first..width).step_by(lanes) {
+                    W::load(&row[at..]).mul(root).store(&mut row[at..]);
                 }
-                let v = window.variance(k, j, lane);
-                if !(v > 0.0 && v.is_finite()) {
-                    return Err((lane, window.begin[lane] + k));
+                for at in (first..last).step_by(lanes) {
+                    W::load(&second[at..]).mul(half).store(&mut second[at..]);
                 }
-                let (root, half) = (v.sqrt(), std::f64::consts::FRAC_1_SQRT_2);
-                window.log_variances[number] = v.ln();
-                let at = |column: usize| column * lanes + lane;
-                let row = window.row_mut(k, j);
-                (0..=last).for_each(|column| row[at(column)] /= root);
-                let second = window.variance_row_mut(k, j);
-                (0..last).for_each(|column| second[at(column)] *= half / v);
+            }
+            for lane in lanes - lanes % W::LANES..lanes {
+                let v = if second[last + lane] == 0.0 { 1.0 } else { second[last + lane] };
+                let (root, half) = (1.0 / v.sqrt(), FRAC_1_SQRT_2 / v);
+                row[lane..].iter_mut().step_by(lanes).for_each(|entry| *entry *= root);
+                second[lane..last].iter_mut().step_by(lanes).for_each(|entry| *entry *= half);
             }
         }
     }
-    Ok(())
 }
 
 #[cfg(test)]
@@ -171,9 +199,11 @@ mod tests {
                 window.variance_row_mut(k, 0).copy_from_slice(&[5.0, if k == 2 { variance } else { 4.0 }]);
             }
             assert_eq!(by_variance(&mut window).err(), failed);
-            assert_eq!(window.row(1, 0), [3.0, 1.5]);
-            assert!((window.variance_row(1, 0)[0] - 5.0 / 32f64.sqrt()).abs() < 1e-15);
-            assert_eq!(window.log_variance(1, 0, 0), 4f64.ln());
+            if failed.is_none() {
+                assert_eq!(window.row(1, 0), [3.0, 1.5]);
+                assert!((window.variance_row(1, 0)[0] - 5.0 / 32f64.sqrt()).abs() < 1e-15);
+                assert_eq!(window.log_variance(1, 0, 0), 4f64.ln());
+            }
         }
     }
 }

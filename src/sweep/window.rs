@@ -20,8 +20,6 @@ pub struct Window {
     pub samples: Vec<usize>,
     values: Aligned,
     variances: Aligned,
-    /// Logarithm of each predicted variance, per row and lane, once the errors are standardized by them.
-    pub(crate) log_variances: Vec<f64>,
     /// Per row, a bit for each lane that holds a measurement.
     measured: Vec<u32>,
     /// The carry at each lane's first sample, entry by entry.
@@ -46,7 +44,6 @@ impl Window {
             samples: vec![0; lanes],
             values: Aligned::zeros(size),
             variances: Aligned::zeros(if variances { size } else { 0 }),
-            log_variances: vec![0.0; if variances { capacity * outputs * lanes } else { 0 }],
             measured: vec![0; capacity * outputs],
             carry: vec![],
             whole: false,
@@ -108,6 +105,12 @@ impl Window {
     pub fn variance_rows_mut(&mut self) -> &mut [f64] {
         let used = self.len() * self.outputs * self.columns * self.lanes;
         &mut self.variances[..used]
+    }
+
+    /// Rows and those of the variances.
+    pub(crate) fn rows_and_variances_mut(&mut self) -> (&mut [f64], &mut [f64]) {
+        let used = self.len() * self.outputs * self.columns * self.lanes;
+        (&mut self.values[..used], &mut self.variances[..used])
     }
 
     /// The rows of a window of one lane, and whether each holds a measurement.
@@ -184,17 +187,23 @@ impl Window {
         self.variances.get(at).copied().unwrap_or(1.0)
     }
 
-    /// Standard deviation that the error was divided by, where variances are predicted and the window is standardized.
+    /// Standard deviation that the error was divided by, where variances are predicted and the window is standardized; one where nothing was
+    /// measured.
     #[inline(always)]
     pub(crate) fn variance_root(&self, sample: usize, output: usize, lane: usize) -> f64 {
-        (0.5 * self.log_variance(sample, output, lane)).exp()
+        match self.variance(sample, output, lane) {
+            0.0 => 1.0,
+            variance => variance.sqrt(),
+        }
     }
 
     /// Logarithm of the variance that the error was divided by; zero where variances are not predicted.
     #[inline(always)]
     pub(crate) fn log_variance(&self, sample: usize, output: usize, lane: usize) -> f64 {
-        let at = (sample * self.outputs + output) * self.lanes + lane;
-        self.log_variances.get(at).copied().unwrap_or(0.0)
+        match self.variance(sample, output, lane) {
+            0.0 => 0.0,
+            variance => variance.ln(),
+        }
     }
 
     /// Whether an output was measured at a sample of a lane.
