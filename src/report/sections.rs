@@ -9,6 +9,7 @@ mod records;
 mod reproduce;
 mod residuals;
 mod starts;
+mod states;
 
 use super::facts::Facts;
 use crate::section::Section;
