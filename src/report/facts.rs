@@ -1,7 +1,7 @@
 //! Contents of a report: plain values that do not depend on the model's types.
 
-use crate::diagnose::Identifiability;
 use crate::diagnose::residuals::Residuals;
+use crate::diagnose::{Identifiability, ProcessNoise};
 use crate::estimate::{Summary, Unknown};
 use crate::information::SquareMatrix;
 use crate::numeral::TimeUnit;
@@ -17,6 +17,8 @@ pub(super) struct Facts {
     pub correlation: SquareMatrix,
     pub records: Vec<Record>,
     pub identifiability: Identifiability,
+    /// Of a filter, where the test takes no more steps than the estimate did.
+    pub process_noise: Option<ProcessNoise>,
 }
 
 /// One record of the fit.

@@ -28,7 +28,8 @@ const BAND: f64 = 0.95;
 impl Report {
     /// The report of an estimate and of its problem, with the diagnoses that cost little: tests of the residuals,
     /// identifiability, and predictions with 95 % bands (none with a pre-filter, whose noise is not that of the
-    /// measurement). They take some six passes over the data.
+    /// measurement). They take some six passes over the data. Of a filter, the states of the records that are drawn, and a test of process noise
+    /// ([`diagnose::process_noise`]) where it takes no more trial steps than the estimate did.
     ///
     /// # Errors
     /// An estimate of another problem; a prediction that fails or is not finite.
@@ -62,6 +63,7 @@ impl Report {
             estimate: Summary { warnings, ..estimate.clone() },
             records,
             identifiability,
+            process_noise: diagnose::cheap_process_noise(problem, estimate),
         }))
     }
 }
