@@ -35,20 +35,22 @@ pub struct ProcessNoise {
 /// A likelihood that is higher by less without process noise is rounding, and what a search leaves.
 const ROUNDING: f64 = 1e-3;
 
-/// Tests whether the plant is disturbed: fits again with all diffusion zero, from the estimate, and compares the likelihoods. Unknowns on which nothing
-/// but diffusion depends, the levels, have no influence then.
+/// Tests whether the plant is disturbed: fits again with all diffusion zero, from the estimate, and compares the likelihoods. Unknowns on which
+/// nothing but diffusion depends, the levels, have no influence then.
 ///
-/// A level cannot be negative, so that zero is on the boundary, and the ratio is not distributed as chi squared: of one level, half of the records
-/// give zero, and the others chi squared with one degree of freedom (H. Chernoff, Annals of Mathematical Statistics 25 (1954) 573-578). Of `k`
-/// levels the p-value is by the mixture of chi squared with `j = 0..k` degrees of freedom with binomial weights `k! / (j! (k - j)! 2^k)` (S. G. Self and K.-Y. Liang,
-/// Journal of the American Statistical Association 82 (1987) 605-610, case 9), which holds for levels whose estimates are not correlated; for others
-/// it is an approximation. Levels of one state that only their product or their sum tells count as several: the test is conservative then.
+/// A level cannot be negative, so that zero is on the boundary, and the ratio is not distributed as chi squared: of one level, half of the
+/// records give zero, and the others chi squared with one degree of freedom (H. Chernoff, Annals of Mathematical Statistics 25 (1954) 573-578). Of
+/// `k` levels the p-value is by the mixture of chi squared with `j = 0..k` degrees of freedom with binomial weights `k! / (j! (k - j)! 2^k)` (S. G.
+/// Self and K.-Y. Liang, Journal of the American Statistical Association 82 (1987) 605-610), which holds for levels whose estimates are not
+/// correlated; for others it is an approximation. In records that are short against the time over which the state remembers, zero is more frequent
+/// than that, and the test conservative (C. M. Crainiceanu and D. Ruppert, Journal of the Royal Statistical Society B 66 (2004) 165-185). So it
+/// is where several parameters make up one level, each of which counts.
 ///
 /// # Errors
-/// [`Error::NotDisturbed`] of a predictor that does not take the process noise of the model, of a model without diffusion or that is not read as a graph, and where diffusion is not
-/// zero with its levels: it is given, or depends on what other equations depend on. [`Error::Undisturbed`] where the fit without process noise fails.
-/// Weighted and robust fits, which have no likelihood; an estimate that is no maximum of it, or of another problem; a time limit or a flag
-/// that stops it.
+/// [`Error::NotDisturbed`] of a predictor that does not take the process noise of the model, of a model without diffusion or that is not read as a
+/// graph, and where diffusion is not zero with its levels: it is given, or depends on what other equations depend on. [`Error::Undisturbed`] where
+/// the fit without process noise fails. Weighted and robust fits, which have no likelihood; an estimate that is no maximum of it, or of another
+/// problem; a time limit or a flag that stops it.
 ///
 /// ```
 /// use greybox::{Experiment, Fit, Kalman, Kind, Model, Nothing, Scalar, Time, diagnose, fixed, free, signals};
@@ -169,7 +171,8 @@ fn without<'o>(
     }
     match diffusion.remaining.first() {
         Some(state) => none(format!(
-            "the diffusion of `{}` is not zero where its unknowns are that no other equation depends on; declare its level free, as a factor of its own",
+            "the diffusion of `{}` is not zero where the unknowns are zero on which nothing else depends; declare its level free, as a factor of \
+             its own",
             name(state)
         )),
         None if diffusion.levels.is_empty() => none("its levels are given as zero; declare one free".to_owned()),
@@ -218,8 +221,8 @@ impl From<ProcessNoise> for Section {
 mod tests {
     use super::tail;
 
-    /// Of one level half of chi squared with one degree of freedom, whose 0.9 quantile is 2.7055; of two, a half and a quarter: 1/2 P(chi2_1 > 4.2306) + 1/4
-    /// exp(-4.2306 / 2) = 0.05 (Self and Liang's case 9 is tabulated so: 4.23).
+    /// Of one level half of chi squared with one degree of freedom, whose 0.9 quantile is 2.7055; of two, a half and a quarter:
+    /// 1/2 P(chi2_1 > 4.2306) + 1/4 exp(-4.2306 / 2) = 0.05.
     #[test]
     fn tails_of_the_mixture() {
         assert!((tail(2.705543, 1) - 0.05).abs() < 1e-6);

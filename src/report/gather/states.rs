@@ -15,9 +15,14 @@ pub(super) fn gathered(
     worst: &[Option<usize>],
     numbers: usize,
 ) -> Result<States, String> {
+    let (record, layout) = (&objective.problem.records[e], objective.problem.layout());
+    if let Some(most) = too_long(record.len(), layout.states.len()) {
+        return Err(format!(
+            "of records of more than {most} samples a report has none; ask for them by `smoothed` of the fit"
+        ));
+    }
     let states = |smoothed| objective.states(e, best, smoothed).map_err(|error| error.to_string());
     let (smoothed, filtered) = (states(true)?, states(false)?);
-    let (record, layout) = (&objective.problem.records[e], objective.problem.layout());
     let quantile = Normal::standard().inverse_cdf(0.5 + BAND / 2.0);
     let halves: Vec<Vec<f64>> = smoothed
         .deviations
@@ -55,6 +60,15 @@ pub(super) fn gathered(
     Ok(States { all: all.collect(), timeline })
 }
 
+/// Numbers of covariances of all samples, some 100 bytes of memory each while they are smoothed.
+const MOST: usize = 4_000_000;
+
+/// Of a record that is too long for a report of its states, how many samples are not.
+fn too_long(samples: usize, states: usize) -> Option<usize> {
+    let most = MOST / (states * (states + 1)).max(1);
+    (samples > most).then_some(most)
+}
+
 /// Least and greatest value, if there is one.
 fn range(values: &[f64]) -> Option<(f64, f64)> {
     let finite = || values.iter().copied().filter(|value| value.is_finite());
@@ -65,4 +79,15 @@ fn range(values: &[f64]) -> Option<(f64, f64)> {
 fn root_mean_square(values: &[f64]) -> f64 {
     let finite = || values.iter().filter(|value| value.is_finite());
     (finite().map(|value| value * value).sum::<f64>() / finite().count().max(1) as f64).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn memory_is_bounded() {
+        assert_eq!([too_long(2_000_000, 1), too_long(2_000_001, 1)], [None, Some(2_000_000)]);
+        assert_eq!([too_long(50_000, 8), too_long(60_000, 8)], [None, Some(55_555)]);
+    }
 }
