@@ -94,7 +94,7 @@ fn the_ratio_is_that_of_fits_without() {
 }
 
 /// Without process noise, of one level and of two: p < 0.05 in no more of 200 records than 5 % and three binomial deviations, and zero ratios as
-/// often as the mixture has them, in records of 80 samples more often by up to 20 %. With process noise of a third of the noise it is rejected at 1 % in each of 20.
+/// often as the mixture has them, or as records of 80 samples have them. With process noise of a third of the noise it is rejected at 1 % in each of 20.
 #[test]
 fn it_keeps_its_level_and_sees_noise() {
     const RECORDS: usize = 200;
@@ -109,8 +109,9 @@ fn it_keeps_its_level_and_sees_noise() {
         let deviations = |p: f64| (p * (1.0 - p) / RECORDS as f64).sqrt();
         assert!(rejected <= 0.05 + 3.0 * deviations(0.05), "{levels}: {rejected}");
         assert!(rejected > 0.0, "{levels}: a test that never rejects has no level");
-        let expected = 0.5f64.powi(levels);
-        assert!(zero > expected - 3.0 * deviations(expected) && zero < expected + 0.2, "{levels}: {zero}");
+        // Of one level a half for long records; of 80 samples with all but the level known, 0.595 (20,000 records, by a filter written elsewhere).
+        let (least, most) = (0.5f64.powi(levels), 0.65f64.powi(levels));
+        assert!(zero > least - 3.0 * deviations(least) && zero < most + 3.0 * deviations(most), "{levels}: {zero}");
         assert!(found.iter().all(|found| found.degrees_of_freedom == levels as u64));
     }
     for _ in 0..20 {
