@@ -9,6 +9,7 @@ mod convergence;
 mod derived;
 mod drift;
 mod identifiability;
+mod process_noise;
 mod profile;
 pub mod residuals;
 mod side_by_side;
@@ -22,12 +23,14 @@ pub use derived::{Derived, derived, derived_by};
 pub use drift::{Drift, drift};
 pub use identifiability::{Collinear, Excitation, Identifiability, Segment, identifiability};
 pub(crate) use identifiability::{identifiability_beside_warnings, reworded};
+pub(crate) use process_noise::cheap_process_noise;
+pub use process_noise::{ProcessNoise, process_noise};
 pub use profile::{End, Profile, ProfilePoint, profile};
 pub use side_by_side::Compared;
 
 use crate::error::Error;
 use crate::numeral::p_value;
-use crate::optimize::{Infeasible, LeastSquares, LeastSquaresState, LevenbergMarquardt, Linearization, Machine};
+use crate::optimize::{Infeasible, LeastSquares, LeastSquaresState, LevenbergMarquardt, Linearization, Machine, Stop};
 use crate::problem::{Control, Objective, Problem};
 use crate::section::{Cell, Section, Table};
 use crate::severity::Severity;
@@ -164,7 +167,13 @@ fn linearize(objective: &Objective<'_>, best: &[f64], what: &str) -> Result<Line
 
 /// Place and cost of the minimum that a search from `start` ends in; `None` where it cannot begin or does not end.
 fn minimize(problem: impl LeastSquares, start: Vec<f64>) -> Option<(Vec<f64>, f64)> {
-    let solver: LevenbergMarquardt = LevenbergMarquardt::default();
+    minimize_within(problem, start, Stop::default().iterations)
+}
+
+/// The same in so many trial steps at most.
+fn minimize_within(problem: impl LeastSquares, start: Vec<f64>, trials: u64) -> Option<(Vec<f64>, f64)> {
+    let mut solver: LevenbergMarquardt = LevenbergMarquardt::default();
+    solver.stop = solver.stop.limited(trials);
     let configure = |state: LeastSquaresState| state.param(start);
     let result = Executor::new(problem, solver).configure(configure).ctrlc(false).run().ok()?;
     let ended = result.solver().outcome().is_some_and(|outcome| outcome.converged());

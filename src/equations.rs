@@ -2,6 +2,7 @@
 
 mod dead_times;
 mod degree;
+mod diffusion;
 mod moments;
 mod roots;
 mod slopes;
@@ -9,6 +10,7 @@ mod stored;
 mod terms;
 
 pub(crate) use dead_times::DeadTimes;
+pub(crate) use diffusion::Diffusion;
 pub(crate) use moments::MomentsOf;
 pub use roots::Roots;
 pub(crate) use slopes::{Jacobian, Slopes};

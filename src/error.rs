@@ -303,6 +303,18 @@ pub enum Error {
         /// The predictor.
         predictor: String,
     },
+    /// A test of process noise, of a fit without unknown levels of it.
+    #[error("there is no process noise to test: {reason}")]
+    NotDisturbed {
+        /// Why not, and the remedy.
+        reason: String,
+    },
+    /// A fit without process noise, for a test of it, that fails.
+    #[error("the fit without process noise fails: {reason}")]
+    Undisturbed {
+        /// How.
+        reason: String,
+    },
     /// An initial state, or a restart, that the outputs do not give.
     #[error("experiment `{experiment}`: the state cannot be computed from the outputs ({reason}); {remedy}")]
     StateNotMeasured {

@@ -146,6 +146,8 @@ pub(crate) trait Prediction: Debug + Send + Sync {
     fn restarts(&self) -> Option<Horizon>;
     fn is_simulation(&self) -> bool;
     fn needs_slopes(&self) -> bool;
+    /// Whether it predicts a variance by the model's process noise, as far as is known.
+    fn takes_diffusion(&self) -> bool;
     fn starts_from(&self) -> StartsFrom;
     /// This predictor to the second order, of a filter of first order.
     fn second_order(&self) -> Option<Arc<dyn Prediction>>;
@@ -201,6 +203,11 @@ impl<P: Predictor> Prediction for P {
 
     fn needs_slopes(&self) -> bool {
         Predictor::needs_slopes(self)
+    }
+
+    fn takes_diffusion(&self) -> bool {
+        let given = std::any::TypeId::of::<P>() == std::any::TypeId::of::<GivenNoise>();
+        Predictor::predicts_variance(self) && !given
     }
 
     fn starts_from(&self) -> StartsFrom {

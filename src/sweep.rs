@@ -28,7 +28,7 @@ pub use crate::graph::Seed;
 pub use crate::predict::{Guess, Unstable};
 pub use rest::NotAtRest;
 
-use crate::equations::Term;
+use crate::equations::{Diffusion, Term};
 use crate::error::{Error, Failure};
 use crate::layout::Layout;
 use crate::predict::GivenNoise;
@@ -147,6 +147,12 @@ pub struct Lacking<'s> {
     pub(crate) terms: Vec<Term>,
     /// How many terms more there would be.
     pub(crate) left_out: usize,
+}
+
+/// A sweep of equations without their process noise, and what makes that up.
+pub struct Undisturbed<'s> {
+    pub(crate) sweep: Arc<dyn Sweep + 's>,
+    pub(crate) diffusion: Diffusion,
 }
 
 /// Called with each window; returns false to stop.
@@ -317,6 +323,13 @@ pub trait Sweep: Send + Sync {
 
     /// Of a predictor that takes process noise: the same with terms that the equations might lack; `None` where these are not known.
     fn with_terms<'s>(&'s self) -> Option<Lacking<'s>> {
+        None
+    }
+
+    /// Of a predictor that takes process noise: the same without it. Which of the parameters are its levels depends on which are free, and on the
+    /// values of the others. `None` where the equations are not known.
+    fn undisturbed<'s>(&'s self, parameters: &[f64], free: &[bool]) -> Option<Undisturbed<'s>> {
+        let _ = (parameters, free);
         None
     }
 

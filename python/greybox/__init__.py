@@ -60,6 +60,7 @@ from greybox.fleets import fleet
 from greybox.model import Equations, Model, model
 from greybox.numpy_functions import interp, interp2
 from greybox.parameters import fixed, free
+from greybox.process_noise import ProcessNoise
 from greybox.profile import Profile
 from greybox.records import Record
 from greybox.report import Report
@@ -78,6 +79,7 @@ __all__ = [
     "Model",
     "ModelWarning",
     "Parameter",
+    "ProcessNoise",
     "Profile",
     "Record",
     "RecordWarning",

@@ -15,6 +15,7 @@ from greybox.estimate import Estimate
 from greybox.frames import Array, Kind
 from greybox.model import Equations
 from greybox.parameters import Parameter
+from greybox.process_noise import ProcessNoise
 from greybox.profile import Profile
 from greybox.progress import Progress
 from greybox.records import Record
@@ -179,6 +180,19 @@ class Fit(Estimate):
         if name not in self.unknowns:
             raise Error(f"there is no unknown `{name}`; the fit has: {near(name, self.unknowns)}")
         return Profile(name, probability, self._kind, self._problem.profile(self._estimate, name, probability))
+
+    def process_noise(self) -> ProcessNoise:
+        """Test whether the plant is disturbed: fit again without process noise, and compare the likelihoods.
+
+        Levels of noise cannot be negative, so that the p-value is by a mixture of chi-squared distributions (Chernoff 1954; Self and Liang
+        1987); of several levels whose estimates are correlated it is an approximation, and of short records it is conservative.
+
+        Raises
+        ------
+        Error
+            If the predictor is no filter, the model has no diffusion whose levels are free, or the fit without does not converge.
+        """
+        return ProcessNoise(*self._problem.process_noise(self._estimate))
 
     def bootstrap(self, count: int = 1000, *, blocks: int | None = None, seed: int = 1, progress: bool = False) -> Bootstrap:
         """Refit records that are made of the prediction and resampled residuals: intervals that ask for no normal distribution.

@@ -137,6 +137,12 @@ impl Problem {
         Ok((found.standard_errors, found.bias, found.intervals, found.converged, json))
     }
 
+    /// The test of process noise: names of the levels, likelihood ratio, degrees of freedom and p-value.
+    fn process_noise(&self, py: Python<'_>, estimate: &Estimate) -> PyResult<(Vec<String>, f64, u64, f64)> {
+        let found = self.whole(py, None, || diagnose::process_noise(&self.problem, &estimate.0))?;
+        Ok((found.levels, found.likelihood_ratio, found.degrees_of_freedom, found.p_value))
+    }
+
     /// The half widths of the bands of a record of the fit: of the model alone, and of a new measurement.
     fn bands<'py>(
         &self,

@@ -73,11 +73,18 @@ def test_states() -> None:
     inside = (np.abs(smoothed["level"] - level) < 1.96 * smoothed["level_deviation"]).mean()
     assert inside > 0.85
     assert found.smoothed(frame, time="t", initial={"level": gb.fixed(0.0)}).equals(smoothed)
+    test = found.process_noise()
+    assert test.levels == ["q"] and test.degrees_of_freedom == 1
+    assert test.likelihood_ratio > 100.0 and test.p_value < 1e-20
+    report = found.report()
+    assert "States: " in str(report) and "the plant is disturbed" in report.to_markdown().replace("\n", " ")
     # A simulation explains nothing of a walk.
     with pytest.warns(gb.FitWarning):
         simulated = gb.fit(model, frame, parameters=start | {"q": gb.fixed(0.1)}, time="t")
     with pytest.raises(gb.Error, match="Kalman"):
         simulated.smoothed()
+    with pytest.raises(gb.Error, match="no process noise to test"):
+        simulated.process_noise()
 
 
 def test_reports(fitted: gb.Fit, tmp_path: Path) -> None:

@@ -1,7 +1,7 @@
 //! Contents of a report: plain values that do not depend on the model's types.
 
-use crate::diagnose::Identifiability;
 use crate::diagnose::residuals::Residuals;
+use crate::diagnose::{Identifiability, ProcessNoise};
 use crate::estimate::{Summary, Unknown};
 use crate::information::SquareMatrix;
 use crate::numeral::TimeUnit;
@@ -17,6 +17,8 @@ pub(super) struct Facts {
     pub correlation: SquareMatrix,
     pub records: Vec<Record>,
     pub identifiability: Identifiability,
+    /// Of a filter, where the test takes no more steps than the estimate did.
+    pub process_noise: Option<ProcessNoise>,
 }
 
 /// One record of the fit.
@@ -40,6 +42,25 @@ pub(super) struct Record {
     pub fits: Vec<OutputFit>,
     /// Its drawing; `None` where too many records would be drawn.
     pub timeline: Option<Plot>,
+    /// Its states, or why they are not known; `None` where the predictor is no filter, and where the record is not drawn.
+    pub states: Option<Result<States, String>>,
+}
+
+/// The states of a record by a filter.
+pub(super) struct States {
+    pub all: Vec<State>,
+    /// Each state over time, smoothed with its band, and filtered.
+    pub timeline: Plot,
+}
+
+/// A state of a record by a filter.
+pub(super) struct State {
+    pub name: String,
+    pub unit: String,
+    /// Least and greatest value, smoothed; `None` where none is a number.
+    pub range: Option<(f64, f64)>,
+    /// Root mean squares over the samples of the standard deviations, smoothed and filtered.
+    pub deviations: [f64; 2],
 }
 
 /// A column of a record.
@@ -66,6 +87,8 @@ pub(super) struct OutputFit {
     /// The largest residual in size, with its sign, and its time.
     pub largest: f64,
     pub largest_at: f64,
+    /// Whether the histogram is of residuals divided by the deviations that a filter predicts.
+    pub standardized: bool,
     pub histogram: Histogram,
     /// The samples about the largest residual, where the drawing of the record does not show them one by one.
     pub closeup: Option<Plot>,

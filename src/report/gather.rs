@@ -1,5 +1,7 @@
 //! From an estimate and its problem to the plain values of a report. No other file of the report uses their types.
 
+mod states;
+
 use super::Report;
 use super::facts::{Facts, Histogram, OutputFit, Record, Signal};
 use crate::diagnose::residuals;
@@ -26,7 +28,8 @@ const BAND: f64 = 0.95;
 impl Report {
     /// The report of an estimate and of its problem, with the diagnoses that cost little: tests of the residuals,
     /// identifiability, and predictions with 95 % bands (none with a pre-filter, whose noise is not that of the
-    /// measurement). They take some six passes over the data.
+    /// measurement). They take some six passes over the data. Of a filter, the states of the records that are drawn, and a test of process noise
+    /// ([`diagnose::process_noise`]) where it takes no more trial steps than the estimate did.
     ///
     /// # Errors
     /// An estimate of another problem; a prediction that fails or is not finite.
@@ -34,8 +37,10 @@ impl Report {
         let identifiability = diagnose::identifiability_beside_warnings(problem, estimate)?;
         let (objective, best) = problem.at(estimate)?;
         let outputs = estimate.outputs.len();
+        let has_states = objective.sweep.predicts_variance() && !problem.layout().states.is_empty();
         let numbers = NUMBERS / problem.records().len().min(DRAWN / outputs.max(1)).max(1);
-        let mut records = vec![];
+        let numbers = if has_states { numbers / 2 } else { numbers };
+        let (mut records, mut worst) = (vec![], vec![]);
         for (e, record) in problem.records().iter().enumerate() {
             let prediction = objective.predict(e, &best)?;
             let widths = match problem.settings.prefilter {
@@ -44,8 +49,13 @@ impl Report {
             };
             let of = Columns::new(&estimate.experiments[e].name, record, &prediction, widths.as_ref());
             records.push(of.gathered(problem.layout().kind, residuals::examine(&prediction, record)?, numbers));
+            worst.push(of.worst);
         }
         thin(&mut records, outputs);
+        for (e, record) in records.iter_mut().enumerate().filter(|(_, record)| has_states && record.timeline.is_some())
+        {
+            record.states = Some(states::gathered(&objective, &best, (e, &record.name), &worst[e], numbers));
+        }
         let warnings = diagnose::reworded(&estimate.warnings, &estimate.directions, &estimate.unknowns);
         Ok(Report::of(&Facts {
             model: problem.sweep.identity(),
@@ -53,6 +63,7 @@ impl Report {
             estimate: Summary { warnings, ..estimate.clone() },
             records,
             identifiability,
+            process_noise: diagnose::cheap_process_noise(problem, estimate),
         }))
     }
 }
@@ -65,19 +76,25 @@ struct Columns<'a> {
     gaps: Vec<usize>,
     prediction: &'a Simulated,
     bands: Option<&'a Widths>,
+    /// Of a filter, the residuals divided by their predicted deviations.
+    standardized: Vec<Vec<f64>>,
     /// The sample with the largest residual of each output.
     worst: Vec<Option<usize>>,
 }
 
 impl<'a> Columns<'a> {
     fn new(name: &'a str, record: &'a Measured, prediction: &'a Simulated, bands: Option<&'a Widths>) -> Self {
+        let over = |(residuals, deviations): (&Vec<f64>, &Vec<f64>)| {
+            residuals.iter().zip(deviations).map(|(residual, deviation)| residual / deviation).collect()
+        };
         Columns {
             name,
             record,
-            t: (0..record.len()).map(|k| record.time_unit().convert(record.time(k))).collect(),
-            gaps: record.gaps().iter().map(|gap| gap.sample).collect(),
+            t: times(record),
+            gaps: jumps(record),
             prediction,
             bands,
+            standardized: prediction.residuals.iter().zip(&prediction.deviations).map(over).collect(),
             worst: prediction.residuals.iter().map(|residuals| largest(residuals)).collect(),
         }
     }
@@ -101,7 +118,8 @@ impl<'a> Columns<'a> {
                 residuals,
                 largest: worst.map_or(0.0, |k| errors[k]),
                 largest_at: self.t[worst.unwrap_or(0)],
-                histogram: Histogram::new(errors),
+                standardized: self.standardized.get(j).is_some(),
+                histogram: Histogram::new(self.standardized.get(j).unwrap_or(errors)),
                 closeup: worst.filter(|_| !single || self.t.len() > 4 * CLOSE).map(|worst| self.closeup(j, worst)),
             }
         });
@@ -122,11 +140,12 @@ impl<'a> Columns<'a> {
                 format!("{} over time", self.name),
                 Drawing::Timeline(timeline),
             )),
+            states: None,
         }
     }
 
-    /// The panels of an output: what was measured and predicted, and what is left.
-    fn panels(&self, j: usize) -> [Panel; 2] {
+    /// The panels of an output: what was measured and predicted, what is left, and that over its predicted deviation.
+    fn panels(&self, j: usize) -> Vec<Panel> {
         let Channel { name, unit, .. } = &self.record.outputs()[j];
         let line = |style, name: &str| Line { style, name: name.to_owned(), held: false };
         let (percent, mut lines) = (100.0 * BAND, vec![]);
@@ -135,13 +154,15 @@ impl<'a> Columns<'a> {
             lines.push(line(Style::Confidence, &format!("{percent} % of the model alone")));
         }
         lines.extend([line(Style::Measured, "measured"), line(Style::Predicted, "predicted")]);
-        let residual = Panel {
-            name: format!("residual of {name}"),
-            unit: unit.clone(),
+        let residual = |name: String, unit: &str| Panel {
+            name,
+            unit: unit.to_owned(),
             kind: PanelKind::Residual,
             lines: vec![line(Style::Residual, "residual")],
         };
-        [Panel { name: name.clone(), unit: unit.clone(), kind: PanelKind::Response, lines }, residual]
+        let response = Panel { name: name.clone(), unit: unit.clone(), kind: PanelKind::Response, lines };
+        let standardized = self.standardized.get(j).map(|_| residual(format!("standardized residual of {name}"), ""));
+        [response, residual(format!("residual of {name}"), unit)].into_iter().chain(standardized).collect()
     }
 
     /// The lines of these panels.
@@ -152,7 +173,8 @@ impl<'a> Columns<'a> {
             (Keep::ExtremesAndMean, self.prediction.outputs[j].as_slice()),
             (Keep::Extremes, self.prediction.residuals[j].as_slice()),
         ];
-        bands.map(|widths| (Keep::Median, widths.as_slice())).chain(rest)
+        let standardized = self.standardized.get(j).map(|values| (Keep::Extremes, values.as_slice()));
+        bands.map(|widths| (Keep::Median, widths.as_slice())).chain(rest).chain(standardized)
     }
 
     fn samples<'s>(&'s self, lines: Vec<(Keep, &'s [f64])>) -> Samples<'s> {
@@ -180,11 +202,21 @@ impl<'a> Columns<'a> {
         let samples = self.samples(self.lines(j).collect());
         let start = self.t.first().copied().unwrap_or(0.0);
         let stretches = vec![samples.stretch(about(worst, self.t.len()), CLOSE, start)];
-        let (time_unit, panels) = (samples.time_unit.to_owned(), self.panels(j).to_vec());
+        let (time_unit, panels) = (samples.time_unit.to_owned(), self.panels(j));
         let drawing = Drawing::Timeline(Timeline { time_unit, start, panels, stretches });
         let title = format!("Output {output} of {record} about its largest residual");
         Plot::of(identifier(&format!("closeup-{record}-{output}")), "About the largest residual", title, drawing)
     }
+}
+
+/// The time of each sample, in the unit of the record.
+fn times(record: &Measured) -> Vec<f64> {
+    (0..record.len()).map(|k| record.time_unit().convert(record.time(k))).collect()
+}
+
+/// The samples before which time jumps.
+fn jumps(record: &Measured) -> Vec<usize> {
+    record.gaps().iter().map(|gap| gap.sample).collect()
 }
 
 fn signal(channel: &Channel, found: &ChannelInspection, role: &'static str) -> Signal {

@@ -9,6 +9,7 @@ mod records;
 mod reproduce;
 mod residuals;
 mod starts;
+mod states;
 
 use super::facts::Facts;
 use crate::section::Section;
@@ -19,6 +20,7 @@ pub(super) const LAST: [&str; 3] = ["checks", "data", "reproduce"];
 pub(super) fn all(facts: &Facts) -> Vec<Section> {
     let mut sections = vec![parameters::section(facts), outputs::section(facts)];
     sections.extend(records::sections(facts));
+    sections.extend(facts.process_noise.as_ref().map(Section::from));
     sections.extend(residuals::section(facts));
     sections.push(identifiability::section(facts));
     sections.extend(starts::section(facts));

@@ -44,6 +44,8 @@ pub enum PanelKind {
     Response,
     /// Measured less predicted.
     Residual,
+    /// A state, estimated by a filter; its axis has room for its band.
+    State,
     /// An input.
     Input,
 }

@@ -4,7 +4,8 @@ use super::affine::not_affine;
 use super::failure::FailureSearch;
 use super::filtered::Filter;
 use super::{
-    Evaluated, Lacking, ModelCode, NoStart, Piece, Prepared, Reached, RunError, Seed, States, Sweep, Visit, unmoved,
+    Evaluated, Lacking, ModelCode, NoStart, Piece, Prepared, Reached, RunError, Seed, States, Sweep, Undisturbed,
+    Visit, unmoved,
 };
 use crate::equations::WithTerms;
 use crate::error::{Error, Failure};
@@ -209,6 +210,14 @@ impl Sweep for DualSweep<'_> {
         let (method, predictor) = (self.method.clone(), self.predictor.clone());
         let sweep = DualSweep { layout, code, method, predictor, uncompiled: self.uncompiled.clone() };
         Some(Lacking { sweep: Arc::new(sweep), terms, left_out })
+    }
+
+    fn undisturbed<'s>(&'s self, parameters: &[f64], free: &[bool]) -> Option<Undisturbed<'s>> {
+        let equations = self.code.equations().filter(|_| self.predictor.takes_diffusion())?;
+        let code = Arc::new(Evaluated::new(Arc::new(equations.undisturbed())));
+        let (layout, method, predictor) = (self.layout.clone(), self.method.clone(), self.predictor.clone());
+        let sweep = DualSweep { layout, code, method, predictor, uncompiled: self.uncompiled.clone() };
+        Some(Undisturbed { sweep: Arc::new(sweep), diffusion: equations.process_noise(parameters, free) })
     }
 
     fn second_order<'s>(&'s self) -> Option<Arc<dyn Sweep + 's>> {

@@ -9,7 +9,7 @@ mod run;
 mod workspace;
 
 use super::made::of_equations;
-use super::{Coupling, Lacking, NoStart, Piece, Prepared, Reached, RunError, Seed, States, Sweep, Visit};
+use super::{Coupling, Lacking, NoStart, Piece, Prepared, Reached, RunError, Seed, States, Sweep, Undisturbed, Visit};
 use crate::engine::{Program, Sampling, Trajectories};
 use crate::equations::{Equations, WithTerms};
 use crate::error::{Error, Failure};
@@ -302,6 +302,15 @@ impl Sweep for ProgramSweep<'_> {
             Some(Lacking { sweep, terms, left_out })
         };
         self.programs.lacking.get_or_init(make).clone()
+    }
+
+    fn undisturbed<'s>(&'s self, parameters: &[f64], free: &[bool]) -> Option<Undisturbed<'s>> {
+        let Programs { equations, method, predictor, .. } = &*self.programs;
+        if !predictor.takes_diffusion() {
+            return None;
+        }
+        let sweep = of_equations(&Arc::new(equations.undisturbed()), method, predictor).ok()?;
+        Some(Undisturbed { sweep, diffusion: equations.process_noise(parameters, free) })
     }
 
     fn second_order<'s>(&'s self) -> Option<Arc<dyn Sweep + 's>> {

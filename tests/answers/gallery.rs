@@ -87,6 +87,8 @@ fn pages_are_written() {
     of_unclear(&[unclear(1, "<b>bench</b> 3, \"cold\"")]).unwrap().save(folder.join("unclear.html")).unwrap();
     let twelve: Vec<_> = (0..12).map(|k| unclear(10 + k, &format!("run {k} of the long series"))).collect();
     of_unclear(&twelve).unwrap().save(folder.join("twelve.html")).unwrap();
+    let (_, _, filter) = crate::states::reported(&crate::states::house(1200, 1));
+    filter.titled("A house in the sun").save(folder.join("filter.html")).unwrap();
     let even = |samples: usize| (0..samples).map(|k| k as f64 * 0.01).collect();
     let (fitted, other) = (record(even(3000), 0.05, 3), record(even(1000), 0.05, 4).named("another day"));
     let estimate = Fit::new(&Lag, &fitted)

@@ -17,5 +17,6 @@ mod scales;
 #[path = "../common/shared.rs"]
 mod shared;
 mod silent_failures;
+mod states;
 mod stops;
 mod told_apart;

@@ -10,6 +10,7 @@ mod hardening;
 mod initial;
 mod missing_terms;
 mod moving_levels;
+mod process_noise;
 mod second_order;
 mod simulated;
 mod simulates;

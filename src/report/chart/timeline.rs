@@ -16,6 +16,7 @@ fn height(kind: PanelKind) -> f64 {
     match kind {
         PanelKind::Response => 220.0,
         PanelKind::Residual => 110.0,
+        PanelKind::State => 160.0,
         PanelKind::Input => 80.0,
     }
 }
@@ -24,7 +25,7 @@ fn height(kind: PanelKind) -> f64 {
 fn along(timeline: &Timeline, panel: &Panel) -> Along {
     match timeline.panels.last() == Some(panel) {
         true => Along::Titled,
-        false if panel.kind == PanelKind::Response => Along::Numbered,
+        false if matches!(panel.kind, PanelKind::Response | PanelKind::State) => Along::Numbered,
         false => Along::Bare,
     }
 }
@@ -63,7 +64,7 @@ fn panels(timeline: &Timeline, to: &mut Markup, size: Size, name: &str) {
     let mut first = 0;
     for (i, drawn) in timeline.panels.iter().enumerate() {
         let of = match drawn.kind {
-            PanelKind::Response => format!("{name}: {}", drawn.name),
+            PanelKind::Response | PanelKind::State => format!("{name}: {}", drawn.name),
             PanelKind::Residual | PanelKind::Input => format!("{name}: {} of it", drawn.name),
         };
         let attributes: [(&str, &dyn Display); 2] = [("class", &"panel"), ("data-panel", &i)];
@@ -77,12 +78,17 @@ fn panel(timeline: &Timeline, panel: &Panel, first: usize, to: &mut Markup, size
     let Some(whole) = timeline.stretches.first() else { return };
     let x = Scale::new(&time_axis(timeline), whole.t.first().copied().zip(whole.t.last().copied()));
     let traces = || panel.lines.iter().zip(whole.traces.get(first..).unwrap_or_default());
+    let center = traces().find(|(line, _)| line.style == Style::Predicted).map(|(_, trace)| trace);
     let drawn = traces().filter(|(line, _)| !is_band(line.style)).flat_map(|(_, trace)| trace.extremes().flatten());
-    let range = drawn.fold(None, |range: Option<(f64, f64)>, (low, high)| {
+    // A state may move by less than is known of it.
+    let banded = traces().filter(|(line, _)| panel.kind == PanelKind::State && is_band(line.style));
+    let banded =
+        banded.flat_map(|(_, half)| center.into_iter().flat_map(|center| center.means().iter().zip(&half.low)));
+    let banded = banded.filter_map(|(mean, half)| mean.zip(*half)).map(|(mean, half)| (mean - half, mean + half));
+    let range = drawn.chain(banded).fold(None, |range: Option<(f64, f64)>, (low, high)| {
         Some(range.map_or((low, high), |(least, greatest)| (least.min(low), greatest.max(high))))
     });
     let y = Scale::new(&Axis::new(&panel.name, &panel.unit), range).with_room();
-    let center = traces().find(|(line, _)| line.style == Style::Predicted).map(|(_, trace)| trace);
     let height = height(panel.kind);
     let columns = if let Size::Fluid(columns) = size { columns } else { COLUMNS };
     let stretched = |frame: &Frame, svg: &mut Markup| {

@@ -132,16 +132,26 @@ class Timeline {
     this.panels.forEach((panel) => this.draw(panel, stretch));
   }
 
-  draw({ node, layers, lines, first, name, unit }, stretch) {
+  draw({ node, layers, lines, first, name, unit, kind }, stretch) {
     const { width, height } = layers.viewBox.baseVal;
     const across = axisOf(...this.shown);
     const columns = lines.map((line, k) => {
       const { low, high } = stretch.lines[first + k];
       return isBand(line) ? columnsOf(stretch, low, low, this.shown) : columnsOf(stretch, low, high, this.shown);
     });
+    const center = lines.findIndex(({ style }) => style === "predicted");
+    const means = center < 0 ? [] : columnsOf(stretch, stretch.lines[first + center].mean, stretch.lines[first + center].mean, this.shown);
     let [least, greatest] = [Infinity, -Infinity];
     lines.forEach((line, k) => {
-      if (isBand(line)) return;
+      if (isBand(line)) {
+        // A state may move by less than is known of it.
+        if (kind !== "state") return;
+        means.forEach((mean, c) => {
+          const half = mean && columns[k][c]?.greatest;
+          if (half) [least, greatest] = [Math.min(least, mean.least - half), Math.max(greatest, mean.greatest + half)];
+        });
+        return;
+      }
       for (const column of columns[k]) {
         if (column) [least, greatest] = [Math.min(least, column.least), Math.max(greatest, column.greatest)];
       }
@@ -155,13 +165,11 @@ class Timeline {
     const upwards = axisOf(least - room, greatest + room);
     const short = (value) => Math.round(value * 100) / 100;
     const place = (t, value) => `${short(width * across.at(t))} ${short(height * (1 - upwards.at(value)))}`;
-    const center = lines.findIndex(({ style }) => style === "predicted");
     lines.forEach((line, k) => {
       const path = layers.children[k];
       if (!path) return;
       if (!isBand(line)) return path.setAttribute("d", linePath(columns[k], place, line.held));
-      const { mean } = stretch.lines[first + center];
-      path.setAttribute("d", bandPath(columnsOf(stretch, mean, mean, this.shown), columns[k], place));
+      path.setAttribute("d", bandPath(means, columns[k], place));
     });
     this.mark(node, across, upwards, height, name, unit);
   }

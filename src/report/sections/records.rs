@@ -1,7 +1,7 @@
 //! The records: measured and predicted over time, and what is left of each output.
 
 use super::outputs::extent;
-use super::{quoted, residuals};
+use super::{quoted, residuals, states};
 use crate::numeral::{counted, rounded, unit_after};
 use crate::report::facts::{Facts, Record};
 use crate::section::{Drawing, Section};
@@ -12,24 +12,27 @@ const NAMED: usize = 5;
 /// Plots of residuals against signals, in all and of one output.
 const AGAINST: usize = 120;
 
-/// A section for each record that is drawn; of several, the one reproduced worst is open.
+/// A section for each record that is drawn, and after it one for its states by a filter; of several, those of the record reproduced worst are
+/// open.
 pub(super) fn sections(facts: &Facts) -> Vec<Section> {
     let drawn = || facts.records.iter().filter(|record| record.timeline.is_some());
     let outputs = drawn().map(|record| record.fits.len()).sum::<usize>();
     let against = (AGAINST / outputs.max(1)).clamp(4, 16);
     let worst = |record: &Record| record.fits.iter().filter_map(|fit| fit.fit_percent).fold(f64::INFINITY, f64::min);
     let least = drawn().map(worst).fold(f64::INFINITY, f64::min);
-    let mut sections: Vec<Section> = drawn().enumerate().map(|(i, record)| section(i + 1, record, against)).collect();
     let open = drawn().position(|record| worst(record) == least).unwrap_or(0);
-    let closed = sections.iter_mut().enumerate().filter(|(i, _)| *i != open);
-    closed.for_each(|(_, section)| section.folded = true);
-    let left = facts.records.len() - drawn().count();
-    if let Some(last) = sections.last_mut().filter(|_| left > 0) {
-        let text =
-            format!("{}, reproduced better than those drawn, are not drawn.", counted(left as u64, "more record"));
-        last.sentences.push(text);
-    }
-    sections
+    let (count, left) = (drawn().count(), facts.records.len() - drawn().count());
+    let of_record = |(i, record): (usize, &Record)| {
+        let mut of_outputs = section(i + 1, record, against);
+        if left > 0 && i + 1 == count {
+            let text =
+                format!("{}, reproduced better than those drawn, are not drawn.", counted(left as u64, "more record"));
+            of_outputs.sentences.push(text);
+        }
+        let all = [Some(of_outputs), states::section(i + 1, record)].into_iter().flatten();
+        all.map(move |section| Section { folded: i != open, ..section })
+    };
+    drawn().enumerate().flat_map(of_record).collect()
 }
 
 fn section(number: usize, record: &Record, against: usize) -> Section {

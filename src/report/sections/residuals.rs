@@ -107,14 +107,21 @@ fn outliers(record: &Record, of: &Residuals) -> Option<String> {
     }
 }
 
-/// How often which residual occurs, beside the normal distribution of the same mean and spread.
+/// How often which residual occurs, beside the normal distribution of the same mean and spread; of a filter, the one that it predicts.
 fn histogram(id: &str, record: &Record, fit: &OutputFit) -> Option<Plot> {
     const PARTS: u32 = 120;
     let histogram = &fit.histogram;
     let total = fit.residuals.samples.max(1) as f64;
     let heights: Vec<f64> = histogram.counts.iter().map(|count| 100.0 * *count as f64 / total).collect();
     let to = histogram.from + histogram.width * heights.len() as f64;
-    let (mean, sigma) = (fit.residuals.mean, fit.residuals.standard_deviation);
+    let (name, unit, caption) = match fit.standardized {
+        true => ("standardized residual", "", STANDARDIZED),
+        false => ("residual", fit.unit.as_str(), HISTOGRAM),
+    };
+    let (mean, sigma) = match fit.standardized {
+        true => (0.0, 1.0),
+        false => (fit.residuals.mean, fit.residuals.standard_deviation),
+    };
     let normal = |i: u32| {
         let e = histogram.from + (to - histogram.from) * f64::from(i) / f64::from(PARTS);
         let density = (-0.5 * ((e - mean) / sigma).powi(2)).exp() / (sigma * std::f64::consts::TAU.sqrt());
@@ -122,19 +129,22 @@ fn histogram(id: &str, record: &Record, fit: &OutputFit) -> Option<Plot> {
     };
     let points: Vec<_> = if sigma > 0.0 { (0..=PARTS).map(normal).collect() } else { vec![] };
     let drawing = Curves {
-        x: Axis::new("residual", &fit.unit),
+        x: Axis::new(name, unit),
         y: Axis::new("share", "%").from(0.0),
         layers: vec![
             Layer::Bars { style: Style::Main, first: histogram.from, width: histogram.width, heights },
             Layer::Line { style: Style::Reference, points },
         ],
     };
-    let title = format!("Histogram of the residual of {} of {}", fit.name, record.name);
-    let plot = Plot::of(format!("histogram-{id}-{}", fit.name), HISTOGRAM, title, Drawing::Curves(drawing));
+    let title = format!("Histogram of the {name} of {} of {}", fit.name, record.name);
+    let plot = Plot::of(format!("histogram-{id}-{}", fit.name), caption, title, Drawing::Curves(drawing));
     (!histogram.counts.is_empty()).then_some(plot)
 }
 
 const HISTOGRAM: &str = "Histogram, beside a normal distribution of the same mean and deviation";
+
+const STANDARDIZED: &str =
+    "Histogram of the residuals divided by their predicted deviations, beside the standard normal distribution";
 
 /// Autocorrelation of the residuals.
 fn autocorrelation(id: &str, record: &Record, fit: &OutputFit) -> Option<Plot> {
