@@ -186,20 +186,20 @@ macro_rules! signals {
                 $name { $($field),* }
             }
         }
-        impl<T> From<$name<T>> for [T; $crate::__count!($($field)*)] {
+        impl<T> ::core::convert::From<$name<T>> for [T; $crate::__count!($($field)*)] {
             #[inline(always)]
             fn from(signals: $name<T>) -> Self {
                 [$(signals.$field),*]
             }
         }
-        impl<T> From<$crate::nalgebra::SVector<T, { $crate::__count!($($field)*) }>> for $name<T> {
+        impl<T> ::core::convert::From<$crate::nalgebra::SVector<T, { $crate::__count!($($field)*) }>> for $name<T> {
             #[inline(always)]
             fn from(vector: $crate::nalgebra::SVector<T, { $crate::__count!($($field)*) }>) -> Self {
                 let [[$($field),*]] = vector.data.0;
                 $name { $($field),* }
             }
         }
-        impl<T> From<$name<T>> for $crate::nalgebra::SVector<T, { $crate::__count!($($field)*) }> {
+        impl<T> ::core::convert::From<$name<T>> for $crate::nalgebra::SVector<T, { $crate::__count!($($field)*) }> {
             #[inline(always)]
             fn from(signals: $name<T>) -> Self {
                 $crate::nalgebra::Matrix::from_data($crate::nalgebra::ArrayStorage([[$(signals.$field),*]]))

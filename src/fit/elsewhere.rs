@@ -1,7 +1,8 @@
 //! Searches that a fit runs by itself after its estimate was judged, since another minimum may be the right one: on the other side of
-//! half the frequency of sampling, and from further starts where an output is left unexplained.
+//! half the frequency of sampling, and from further starts, or in stages, where an output is left unexplained.
 
 use super::refine::{Start, is_only_coarse, is_useless};
+use super::staged::STAGES;
 use crate::estimate::{About, Summary, Warning, WarningCode};
 use crate::numeral::counted;
 use crate::problem::{Control, Noise, Problem, SearchPlan, Settings};
@@ -11,6 +12,7 @@ use std::time::{Duration, Instant};
 /// Starts of a fit whose first search left an output unexplained, the declared one among them: of 138 records of predators
 /// and prey 16 starts led 118 to the right minimum, 24 led 133, 32 led 136.
 const STARTS: usize = 32;
+const UNEXPLAINED: &str = "the search from the declared start ended where an output is left unexplained";
 /// Most trial steps of a further search: so many, or so many times those of the search before, by where it begins.
 const LEAST_TRIALS: u64 = 100;
 const FROM_A_START: u64 = 1;
@@ -40,16 +42,24 @@ impl Trials {
     }
 }
 
-/// What searches from further starts found.
+/// What further searches found.
 pub(super) enum Further {
     Found {
         best: Box<Summary>,
+        way: Way,
         /// Whether limits of the fit stopped searches before their end.
         stopped: bool,
         time: Duration,
     },
-    /// Records are longer than so many samples, which would take too long.
+    /// Records are longer than so many samples, with which searches from further starts would take too long, and stages lead nowhere.
     TooLong(usize),
+}
+
+/// Where further searches began.
+pub(super) enum Way {
+    Starts,
+    /// At the end of so many stages.
+    Stages(u32),
 }
 
 impl Further {
@@ -64,19 +74,22 @@ impl Further {
     /// The better one of the best minimum and an estimate that has the work of these searches, with a note.
     fn or(&self, found: &Summary) -> Summary {
         let (mut best, text) = match self {
-            Further::Found { best, stopped, .. } => (
-                if is_better(best, found) { work_of(found, (**best).clone()) } else { found.clone() },
-                format!(
-                    "the search from the declared start ended where an output is left unexplained, so that the fit searched from \
-                     {STARTS} starts by itself, and went on from the best of them{}",
-                    if *stopped { "; limits of the fit stopped searches before their end" } else { "" }
-                ),
-            ),
+            Further::Found { best, way, stopped, .. } => {
+                let way = match way {
+                    Way::Starts => format!("from {STARTS} starts by itself, and went on from the best of them"),
+                    Way::Stages(count) => {
+                        format!("from the end of {} by itself ({STAGES})", counted((*count).into(), "stage"))
+                    }
+                };
+                let stopped = if *stopped { "; limits of the fit stopped searches before their end" } else { "" };
+                let better = if is_better(best, found) { work_of(found, (**best).clone()) } else { found.clone() };
+                (better, format!("{UNEXPLAINED}, so that the fit searched {way}{stopped}"))
+            }
             Further::TooLong(most) => (
                 found.clone(),
                 format!(
-                    "the search from the declared start ended where an output is left unexplained; with more than {} the fit does not \
-                     search from further starts by itself, so ask for Fit::starts({STARTS})",
+                    "{UNEXPLAINED}; with more than {} the fit does not search from further starts by itself, so ask for \
+                     Fit::starts({STARTS})",
                     counted(*most as u64, "sample")
                 ),
             ),
@@ -136,10 +149,10 @@ impl Problem<'_> {
         Some(Summary { seconds: found.seconds + begin.elapsed().as_secs_f64(), ..best })
     }
 
-    /// Searches from further starts where an estimate leaves an output unexplained. They run by the default method; the best minimum goes
-    /// on by finer ones where only the step is wrong with it. `None` where stages or a number of starts were asked for, where the measurements tell
-    /// nothing by any parameters, and where the variance is predicted: that likelihood has no bound at noise levels of zero, which some
-    /// start would find.
+    /// Searches from further starts where an estimate leaves an output unexplained, or in stages, which are fewer searches, where records are
+    /// long. They run by the default method; the best minimum goes on by finer ones where only the step is wrong with it. `None` where stages or
+    /// a number of starts were asked for, where the measurements tell nothing by any parameters, and where the variance is predicted: that
+    /// likelihood has no bound at noise levels of zero, which some start would find.
     pub(super) fn search_further(&self, found: &Summary, control: &Control) -> Option<Further> {
         let hopeless = [WarningCode::ConstantOutput, WarningCode::TooFewMeasurements];
         let predicted = self.settings.noise == Noise::Predicted;
@@ -154,10 +167,13 @@ impl Problem<'_> {
         }
         let trials = Trials::of(FROM_A_START, found.iterations, self.settings.optimizer.most())?.most;
         let most = if self.runs_in_lanes() { LONGEST_IN_LANES } else { LONGEST };
-        if self.samples() > most {
-            return Some(Further::TooLong(most));
-        }
         let begin = Instant::now();
+        if self.samples() > most {
+            let Some((best, led)) = self.from_stages(begin, control) else { return Some(Further::TooLong(most)) };
+            let way = Way::Stages(led.stages);
+            let (best, stopped, time) = (Box::new(best), control.stops(), begin.elapsed());
+            return Some(Further::Found { best, way, stopped, time });
+        }
         let settings = Settings { checkpoint: None, searches: SearchPlan::Best(STARTS), ..self.settings.clone() };
         let problem = Problem { settings, finer: None, ..self.clone() };
         let start = Start { trials, ..Start::declared(&problem) };
@@ -165,7 +181,8 @@ impl Problem<'_> {
         if is_only_coarse(&again) {
             again = self.refined(Ok(again), 0, begin, control).ok()?;
         }
-        Some(Further::Found { best: Box::new(again), stopped: control.stops(), time: begin.elapsed() })
+        let (best, stopped, time) = (Box::new(again), control.stops(), begin.elapsed());
+        Some(Further::Found { best, way: Way::Starts, stopped, time })
     }
 
     /// Whether several pieces of records like the first one run together in vector registers.
@@ -195,7 +212,7 @@ mod tests {
     use super::*;
     use crate::optimize::Outcome;
     use crate::tests::{Current, Gain, Line, Voltage};
-    use crate::{Experiment, Fit, Time, free};
+    use crate::{Experiment, Fit, Model, Nothing, Scalar, Time, free, signals};
 
     /// Neither a higher minimum nor a search that has not ended takes the place of a minimum, where no output is explained.
     #[test]
@@ -237,5 +254,44 @@ mod tests {
             (found.starts.as_ref().map(|starts| starts.tried), said)
         };
         assert_eq!([of(LONGEST_IN_LANES), of(LONGEST_IN_LANES + 1)], [(Some(32), false), (None, true)]);
+    }
+
+    signals! { struct Flow { x: "1", y: "1", z: "1" } }
+    signals! { struct Constants { sigma: "1/s", rho: "1", beta: "1/s" } }
+
+    /// E. N. Lorenz, Journal of the Atmospheric Sciences 20 (1963) 130-141.
+    #[derive(Clone)]
+    struct Lorenz;
+
+    impl Model for Lorenz {
+        type State = Flow;
+        type Input = Nothing;
+        type Output = Flow;
+        type Parameters = Constants;
+
+        fn derivative<S: Scalar>(&self, _t: S, x: &Flow<S>, _u: &Nothing, p: &Constants<S>) -> Flow<S> {
+            Flow { x: p.sigma * (x.y - x.x), y: x.x * (p.rho - x.z) - x.y, z: x.x * x.y - p.beta * x.z }
+        }
+        fn output<S: Scalar>(&self, _t: S, x: &Flow<S>, _u: &Nothing, _p: &Constants<S>) -> Flow<S> {
+            *x
+        }
+    }
+
+    /// A chaotic plant from parameters three times off: the search ends in a minimum that explains nothing. With one sample more than searches from
+    /// further starts are made of, stages lead to the right one, and a note says so.
+    #[test]
+    fn long_records_are_searched_in_stages() {
+        let time = Time::Uniform { start: 0.0, step: 5e-4 };
+        let (truth, from) = (Constants { sigma: 10.0, rho: 28.0, beta: 8.0 / 3.0 }, Flow { x: -6.0, y: -8.0, z: 22.0 });
+        let run = crate::simulate(&Lorenz, &truth, &from, time, &vec![Nothing; LONGEST_IN_LANES + 1]).unwrap();
+        let record = run.with_noise(Flow { x: 0.4, y: 0.4, z: 0.4 }, 3).experiment(&Lorenz).unwrap();
+        let start = || Constants { sigma: free(30.0), rho: free(11.0), beta: free(1.3) };
+        let fit = || Fit::new(&Lorenz, &record).parameters(start());
+        let alone = fit().starts(1).run().unwrap();
+        assert!(leaves_unexplained(&alone), "{alone}");
+        let found = fit().run().unwrap();
+        assert!((found.parameters.sigma / 10.0 - 1.0).abs() < 1e-2, "{found}");
+        let said = found.warnings.iter().any(|warning| warning.text.contains("stages by itself"));
+        assert!(said && found.severity() < Severity::NotUsable, "{found}");
     }
 }

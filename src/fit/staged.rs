@@ -11,7 +11,7 @@ use crate::severity::Severity;
 use std::time::Instant;
 
 /// What the stages are, in words.
-const STAGES: &str = "predictions by a filter that corrects the state at each sample, less in each stage";
+pub(super) const STAGES: &str = "predictions by a filter that corrects the state at each sample, less in each stage";
 
 impl Problem<'_> {
     /// Where the search begins, and a note of the stages, if they were asked for.
@@ -53,7 +53,17 @@ impl Problem<'_> {
         if !(single && matches!(error, Error::Start(_))) {
             return None;
         }
-        let begin = Instant::now();
+        let (mut found, led) = self.from_stages(Instant::now(), control)?;
+        let count = counted(led.stages.into(), "stage");
+        let text = format!(
+            "the declared start cannot be simulated, so that the search began at the end of {count} ({STAGES})"
+        );
+        found.warnings.push(note(text));
+        Some(found)
+    }
+
+    /// The estimate from the end of stages, and these; `None` where they lead nowhere.
+    pub(super) fn from_stages(&self, begin: Instant, control: &Control) -> Option<(Summary, Led)> {
         // A checkpoint is that of the search before.
         let settings = Settings { checkpoint: None, ..self.settings.clone() };
         let problem = Problem { settings, ..self.clone() };
@@ -62,12 +72,7 @@ impl Problem<'_> {
         if is_only_coarse(&found) {
             found = problem.refined(Ok(found), 0, begin, control).ok()?;
         }
-        let count = counted(led.stages.into(), "stage");
-        let text = format!(
-            "the declared start cannot be simulated, so that the search began at the end of {count} ({STAGES})"
-        );
-        found.warnings.push(note(text));
-        Some(found)
+        Some((found, led))
     }
 }
 
