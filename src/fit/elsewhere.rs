@@ -1,8 +1,8 @@
 //! Searches that a fit runs by itself after its estimate was judged, since another minimum may be the right one: on the other side of
-//! half the frequency of sampling, and from further starts, or in stages, where an output is left unexplained.
+//! half the frequency of sampling, and in stages or from further starts where an output is left unexplained.
 
 use super::refine::{Start, is_only_coarse, is_useless};
-use super::staged::STAGES;
+use super::staged::{STAGES, noted};
 use crate::estimate::{About, Summary, Warning, WarningCode};
 use crate::numeral::counted;
 use crate::problem::{Control, Noise, Problem, SearchPlan, Settings};
@@ -63,10 +63,13 @@ pub(super) enum Way {
 }
 
 impl Further {
-    /// The best minimum, if it is usable, in place of the estimate before it.
+    /// The best minimum, if it is usable, or one to which stages led and that explains the outputs, in place of the estimate before it.
     pub fn usable(&self, before: &Summary) -> Option<Summary> {
         match self {
-            Further::Found { best, .. } => (best.severity() < Severity::NotUsable).then(|| self.or(before)),
+            Further::Found { best, way, .. } => {
+                let explains = matches!(way, Way::Stages(_)) && !leaves_unexplained(best);
+                (explains || best.severity() < Severity::NotUsable).then(|| self.or(before))
+            }
             Further::TooLong(_) => None,
         }
     }
@@ -127,7 +130,33 @@ impl Problem<'_> {
         control: &Control,
     ) -> Option<Summary> {
         let searched = self.searched(found, further, control);
-        self.compared_with_simulation(searched.as_ref().unwrap_or(found), control).or(searched)
+        let searched = self.compared_with_simulation(searched.as_ref().unwrap_or(found), control).or(searched);
+        match self.began_anywhere(searched.as_ref().unwrap_or(found), control) {
+            Some(note) => Some(noted(searched.unwrap_or_else(|| found.clone()), Some(note))),
+            None => searched,
+        }
+    }
+
+    /// A note where nothing tells that the minimum is the lowest: it is the only one that was searched for, from a start that explains nothing,
+    /// and its errors are colored, as they are in a wrong one.
+    fn began_anywhere(&self, found: &Summary, control: &Control) -> Option<Warning> {
+        let colored =
+            |warning: &Warning| warning.code == WarningCode::ColoredErrors && warning.severity > Severity::Usable;
+        let searched = |warning: &Warning| warning.code == WarningCode::Unexplained && warning.about == About::Search;
+        let single = self.settings.searches == SearchPlan::Single && !self.settings.staged;
+        if !single
+            || self.sweep.restarts().is_some()
+            || self.sweep.predicts_variance()
+            || control.stops()
+            || !found.warnings.iter().any(colored)
+            || found.warnings.iter().any(searched)
+            || self.start_explains(control)
+        {
+            return None;
+        }
+        let text = "a simulation from the declared start explains nothing, and the errors where the search ended are colored: a lower minimum may lie elsewhere; \
+                    Fit::staged and Fit::starts look for it";
+        Some(Warning::new(WarningCode::Staged, Severity::Usable, text.to_owned()).about(About::Search))
     }
 
     fn searched(&self, found: &Summary, further: Option<&Further>, control: &Control) -> Option<Summary> {
@@ -149,8 +178,8 @@ impl Problem<'_> {
         Some(Summary { seconds: found.seconds + begin.elapsed().as_secs_f64(), ..best })
     }
 
-    /// Searches from further starts where an estimate leaves an output unexplained, or in stages, which are fewer searches, where records are
-    /// long. They run by the default method; the best minimum goes on by finer ones where only the step is wrong with it. `None` where stages or
+    /// Searches in stages where an estimate leaves an output unexplained, and from further starts where these do so, too, and records are
+    /// not long. They run by the default method; the best minimum goes on by finer ones where only the step is wrong with it. `None` where stages or
     /// a number of starts were asked for, where the measurements tell nothing by any parameters, and where the variance is predicted: that
     /// likelihood has no bound at noise levels of zero, which some start would find.
     pub(super) fn search_further(&self, found: &Summary, control: &Control) -> Option<Further> {
@@ -166,13 +195,20 @@ impl Problem<'_> {
             return None;
         }
         let trials = Trials::of(FROM_A_START, found.iterations, self.settings.optimizer.most())?.most;
-        let most = if self.runs_in_lanes() { LONGEST_IN_LANES } else { LONGEST };
         let begin = Instant::now();
-        if self.samples() > most {
-            let Some((best, led)) = self.from_stages(begin, control) else { return Some(Further::TooLong(most)) };
-            let way = Way::Stages(led.stages);
+        let as_further = |best: Summary, way: Way| {
             let (best, stopped, time) = (Box::new(best), control.stops(), begin.elapsed());
-            return Some(Further::Found { best, way, stopped, time });
+            Further::Found { best, way, stopped, time }
+        };
+        let staged = self.from_stages(begin, control);
+        let most = if self.runs_in_lanes() { LONGEST_IN_LANES } else { LONGEST };
+        let is_too_long = self.samples() > most;
+        match staged {
+            Some((best, led)) if is_too_long || !leaves_unexplained(&best) => {
+                return Some(as_further(best, Way::Stages(led.stages)));
+            }
+            _ if is_too_long => return Some(Further::TooLong(most)),
+            _ => {}
         }
         let settings = Settings { checkpoint: None, searches: SearchPlan::Best(STARTS), ..self.settings.clone() };
         let problem = Problem { settings, finer: None, ..self.clone() };
@@ -181,8 +217,7 @@ impl Problem<'_> {
         if is_only_coarse(&again) {
             again = self.refined(Ok(again), 0, begin, control).ok()?;
         }
-        let (best, stopped, time) = (Box::new(again), control.stops(), begin.elapsed());
-        Some(Further::Found { best, way: Way::Starts, stopped, time })
+        Some(as_further(again, Way::Starts))
     }
 
     /// Whether several pieces of records like the first one run together in vector registers.
@@ -199,12 +234,12 @@ pub(super) fn leaves_unexplained(found: &Summary) -> bool {
     found.severity() == Severity::NotUsable && found.warnings.iter().any(unexplained)
 }
 
-/// Whether further searches found a better estimate: one that explains all outputs, or one of no higher deviance. The first search had more
-/// trial steps than most of theirs, and may have ended lower.
+/// Whether further searches found a better estimate: one that explains all outputs, or one of no higher deviance that has converged, if that before
+/// it has. The first search had more trial steps than most of theirs, and may have ended lower.
 fn is_better(again: &Summary, found: &Summary) -> bool {
     let lower = again.deviance.zip(found.deviance).is_some_and(|(again, found)| again <= found + SAME);
     let converged = again.outcome.converged() || !found.outcome.converged();
-    converged && (lower || !leaves_unexplained(again))
+    !leaves_unexplained(again) || (converged && lower)
 }
 
 #[cfg(test)]
@@ -228,7 +263,9 @@ mod tests {
         let unended = Summary { outcome: Outcome::IterationLimit { iterations: 9 }, ..of(-1.0) };
         assert!(!is_better(&unended, &found) && is_better(&of(-1.0), &unended));
         // A higher one that explains the output is better all the same: without its warnings it is usable.
-        assert!(is_better(&Summary { warnings: vec![], ..of(1.0) }, &found));
+        let explains = Summary { warnings: vec![], ..of(1.0) };
+        assert!(is_better(&explains, &found));
+        assert!(is_better(&Summary { outcome: Outcome::IterationLimit { iterations: 9 }, ..explains }, &found));
     }
 
     /// At least 100 steps, three times 50 or 60, as far as 200 leave them: 150 after 50, 140 after 60, none after 200.
