@@ -1,5 +1,5 @@
 //! Searches that a fit runs by itself after its estimate was judged, since another minimum may be the right one: on the other side of
-//! half the frequency of sampling, and in stages or from further starts where an output is left unexplained.
+//! half the frequency of sampling, and from further starts and in stages where an output is left unexplained.
 
 use super::refine::{Start, is_only_coarse, is_useless};
 use super::staged::{STAGES, noted};
@@ -178,8 +178,8 @@ impl Problem<'_> {
         Some(Summary { seconds: found.seconds + begin.elapsed().as_secs_f64(), ..best })
     }
 
-    /// Searches in stages where an estimate leaves an output unexplained, and from further starts where these do so, too, and records are
-    /// not long. They run by the default method; the best minimum goes on by finer ones where only the step is wrong with it. `None` where stages or
+    /// Searches from further starts where an estimate leaves an output unexplained, and in stages where these find nothing usable or
+    /// records are long. They run by the default method; the best minimum goes on by finer ones where only the step is wrong with it. `None` where stages or
     /// a number of starts were asked for, where the measurements tell nothing by any parameters, and where the variance is predicted: that
     /// likelihood has no bound at noise levels of zero, which some start would find.
     pub(super) fn search_further(&self, found: &Summary, control: &Control) -> Option<Further> {
@@ -200,15 +200,12 @@ impl Problem<'_> {
             let (best, stopped, time) = (Box::new(best), control.stops(), begin.elapsed());
             Further::Found { best, way, stopped, time }
         };
-        let staged = self.from_stages(begin, control);
         let most = if self.runs_in_lanes() { LONGEST_IN_LANES } else { LONGEST };
-        let is_too_long = self.samples() > most;
-        match staged {
-            Some((best, led)) if is_too_long || !leaves_unexplained(&best) => {
-                return Some(as_further(best, Way::Stages(led.stages)));
-            }
-            _ if is_too_long => return Some(Further::TooLong(most)),
-            _ => {}
+        if self.samples() > most {
+            let staged = self.from_stages(begin, control);
+            return Some(
+                staged.map_or(Further::TooLong(most), |(best, led)| as_further(best, Way::Stages(led.stages))),
+            );
         }
         let settings = Settings { checkpoint: None, searches: SearchPlan::Best(STARTS), ..self.settings.clone() };
         let problem = Problem { settings, finer: None, ..self.clone() };
@@ -216,6 +213,16 @@ impl Problem<'_> {
         let mut again = problem.run_within(begin, control, start).ok()?;
         if is_only_coarse(&again) {
             again = self.refined(Ok(again), 0, begin, control).ok()?;
+        }
+        if again.severity() == Severity::NotUsable
+            && !control.stops()
+            && let Some((best, led)) = self.from_stages(begin, control)
+            && is_lower(&best, &again)
+        {
+            let evaluations = best.evaluations + again.evaluations;
+            let iterations = best.iterations + again.iterations;
+            let best = Summary { evaluations, iterations, ..best };
+            return Some(as_further(best, Way::Stages(led.stages)));
         }
         Some(as_further(again, Way::Starts))
     }
@@ -232,6 +239,12 @@ pub(super) fn leaves_unexplained(found: &Summary) -> bool {
     let of_an_output = |warning: &Warning| matches!(warning.about, About::Output(_));
     let unexplained = |warning: &Warning| warning.code == WarningCode::Unexplained && of_an_output(warning);
     found.severity() == Severity::NotUsable && found.warnings.iter().any(unexplained)
+}
+
+/// Whether stages led to a lower minimum that explains all outputs, or to one that does where searches from further starts found none.
+fn is_lower(staged: &Summary, again: &Summary) -> bool {
+    let lower = || staged.deviance.zip(again.deviance).is_some_and(|(staged, again)| staged < again - SAME);
+    !leaves_unexplained(staged) && (leaves_unexplained(again) || lower())
 }
 
 /// Whether further searches found a better estimate: one that explains all outputs, or one of no higher deviance that has converged, if that before
@@ -330,5 +343,24 @@ mod tests {
         assert!((found.parameters.sigma / 10.0 - 1.0).abs() < 1e-2, "{found}");
         let said = found.warnings.iter().any(|warning| warning.text.contains("stages by itself"));
         assert!(said && found.severity() < Severity::NotUsable, "{found}");
+    }
+
+    /// Errors of the shape of a slow sine, a fifth of what the output moves: from a gain fifty times too large, which explains nothing, a note says that a lower
+    /// minimum may lie elsewhere; from a gain that is nearly right, and of starts that were asked for, there is none.
+    #[test]
+    fn a_start_that_explains_nothing_is_told_where_errors_are_colored() {
+        let inputs: Vec<Voltage> = (0..400).map(|k| Voltage { u: f64::from(k * 37 % 21) - 10.0 }).collect();
+        let outputs = (0..400).map(|k| Current { i: 2.0 * inputs[k].u + 4.0 * (k as f64 * 0.05).sin() }).collect();
+        let record = Experiment::new(&Line, Time::Uniform { start: 0.0, step: 1.0 }, inputs.clone(), outputs).unwrap();
+        let said = |start: f64, count: Option<usize>| {
+            let fit = Fit::new(&Line, &record).parameters(Gain { a: free(start) });
+            let found = if let Some(count) = count { fit.starts(count).run() } else { fit.run() }.unwrap();
+            assert!(
+                (found.parameters.a / 2.0 - 1.0).abs() < 0.05 && found.severity() == Severity::UsableWithCare,
+                "{found}"
+            );
+            found.warnings.iter().any(|warning| warning.text.contains("a lower minimum may lie elsewhere"))
+        };
+        assert_eq!([said(100.0, None), said(2.1, None), said(100.0, Some(4))], [true, false, false]);
     }
 }
