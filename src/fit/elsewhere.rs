@@ -62,14 +62,18 @@ pub(super) enum Way {
     Stages(u32),
 }
 
+impl Way {
+    /// Whether stages led to what explains all outputs. The search from their end may have met the roughness of a chaotic plant's cost.
+    fn explains(&self, best: &Summary) -> bool {
+        matches!(self, Way::Stages(_)) && !leaves_unexplained(best)
+    }
+}
+
 impl Further {
-    /// The best minimum, if it is usable, or one to which stages led and that explains the outputs, in place of the estimate before it.
+    /// The best minimum, if it is usable, in place of the estimate before it.
     pub fn usable(&self, before: &Summary) -> Option<Summary> {
         match self {
-            Further::Found { best, way, .. } => {
-                let explains = matches!(way, Way::Stages(_)) && !leaves_unexplained(best);
-                (explains || best.severity() < Severity::NotUsable).then(|| self.or(before))
-            }
+            Further::Found { best, .. } => (best.severity() < Severity::NotUsable).then(|| self.or(before)),
             Further::TooLong(_) => None,
         }
     }
@@ -78,15 +82,19 @@ impl Further {
     fn or(&self, found: &Summary) -> Summary {
         let (mut best, text) = match self {
             Further::Found { best, way, stopped, .. } => {
-                let way = match way {
+                let began = match way {
                     Way::Starts => format!("from {STARTS} starts by itself, and went on from the best of them"),
                     Way::Stages(count) => {
                         format!("from the end of {} by itself ({STAGES})", counted((*count).into(), "stage"))
                     }
                 };
                 let stopped = if *stopped { "; limits of the fit stopped searches before their end" } else { "" };
-                let better = if is_better(best, found) { work_of(found, (**best).clone()) } else { found.clone() };
-                (better, format!("{UNEXPLAINED}, so that the fit searched {way}{stopped}"))
+                let better = if way.explains(best) || is_better(best, found) {
+                    work_of(found, (**best).clone())
+                } else {
+                    found.clone()
+                };
+                (better, format!("{UNEXPLAINED}, so that the fit searched {began}{stopped}"))
             }
             Further::TooLong(most) => (
                 found.clone(),
@@ -217,7 +225,7 @@ impl Problem<'_> {
         if again.severity() == Severity::NotUsable
             && !control.stops()
             && let Some((best, led)) = self.from_stages(begin, control)
-            && is_lower(&best, &again)
+            && is_found(&best, &again)
         {
             let evaluations = best.evaluations + again.evaluations;
             let iterations = best.iterations + again.iterations;
@@ -241,18 +249,20 @@ pub(super) fn leaves_unexplained(found: &Summary) -> bool {
     found.severity() == Severity::NotUsable && found.warnings.iter().any(unexplained)
 }
 
-/// Whether stages led to a lower minimum that explains all outputs, or to one that does where searches from further starts found none.
-fn is_lower(staged: &Summary, again: &Summary) -> bool {
-    let lower = || staged.deviance.zip(again.deviance).is_some_and(|(staged, again)| staged < again - SAME);
-    !leaves_unexplained(staged) && (leaves_unexplained(again) || lower())
+/// Whether stages found what searches from further starts did not: something usable, or what explains all outputs, with errors of half the size or less.
+/// Deviances that differ by less may be those of other steps.
+fn is_found(staged: &Summary, again: &Summary) -> bool {
+    let halved = 4f64.ln() * staged.measurements as f64;
+    let lower = || staged.deviance.zip(again.deviance).is_some_and(|(staged, again)| staged < again - halved);
+    staged.severity() < Severity::NotUsable || !leaves_unexplained(staged) && (leaves_unexplained(again) || lower())
 }
 
-/// Whether further searches found a better estimate: one that explains all outputs, or one of no higher deviance that has converged, if that before
-/// it has. The first search had more trial steps than most of theirs, and may have ended lower.
+/// Whether further searches found a better estimate: one that explains all outputs, or one of no higher deviance. The first search had more
+/// trial steps than most of theirs, and may have ended lower.
 fn is_better(again: &Summary, found: &Summary) -> bool {
     let lower = again.deviance.zip(found.deviance).is_some_and(|(again, found)| again <= found + SAME);
     let converged = again.outcome.converged() || !found.outcome.converged();
-    !leaves_unexplained(again) || (converged && lower)
+    converged && (lower || !leaves_unexplained(again))
 }
 
 #[cfg(test)]
@@ -276,9 +286,7 @@ mod tests {
         let unended = Summary { outcome: Outcome::IterationLimit { iterations: 9 }, ..of(-1.0) };
         assert!(!is_better(&unended, &found) && is_better(&of(-1.0), &unended));
         // A higher one that explains the output is better all the same: without its warnings it is usable.
-        let explains = Summary { warnings: vec![], ..of(1.0) };
-        assert!(is_better(&explains, &found));
-        assert!(is_better(&Summary { outcome: Outcome::IterationLimit { iterations: 9 }, ..explains }, &found));
+        assert!(is_better(&Summary { warnings: vec![], ..of(1.0) }, &found));
     }
 
     /// At least 100 steps, three times 50 or 60, as far as 200 leave them: 150 after 50, 140 after 60, none after 200.
