@@ -210,7 +210,7 @@ impl Problem<'_> {
         };
         let most = if self.runs_in_lanes() { LONGEST_IN_LANES } else { LONGEST };
         if self.samples() > most {
-            let staged = self.from_stages(begin, control);
+            let staged = self.searched_in_stages(begin, control);
             return Some(
                 staged.map_or(Further::TooLong(most), |(best, led)| as_further(best, Way::Stages(led.stages))),
             );
@@ -224,7 +224,7 @@ impl Problem<'_> {
         }
         if again.severity() == Severity::NotUsable
             && !control.stops()
-            && let Some((best, led)) = self.from_stages(begin, control)
+            && let Some((best, led)) = self.searched_in_stages(begin, control)
             && is_found(&best, &again)
         {
             let evaluations = best.evaluations + again.evaluations;
@@ -341,7 +341,7 @@ mod tests {
     fn long_records_are_searched_in_stages() {
         let time = Time::Uniform { start: 0.0, step: 5e-4 };
         let (truth, from) = (Constants { sigma: 10.0, rho: 28.0, beta: 8.0 / 3.0 }, Flow { x: -6.0, y: -8.0, z: 22.0 });
-        let run = crate::simulate(&Lorenz, &truth, &from, time, &vec![Nothing; LONGEST_IN_LANES + 1]).unwrap();
+        let run = crate::simulate(&Lorenz, &truth, &from, time, &[Nothing; LONGEST_IN_LANES + 1]).unwrap();
         let record = run.with_noise(Flow { x: 0.4, y: 0.4, z: 0.4 }, 3).experiment(&Lorenz).unwrap();
         let start = || Constants { sigma: free(30.0), rho: free(11.0), beta: free(1.3) };
         let fit = || Fit::new(&Lorenz, &record).parameters(start());

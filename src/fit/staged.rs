@@ -53,7 +53,7 @@ impl Problem<'_> {
         if !(single && matches!(error, Error::Start(_))) {
             return None;
         }
-        let (mut found, led) = self.from_stages(Instant::now(), control)?;
+        let (mut found, led) = self.searched_in_stages(Instant::now(), control)?;
         let count = counted(led.stages.into(), "stage");
         let text = format!(
             "the declared start cannot be simulated, so that the search began at the end of {count} ({STAGES})"
@@ -63,7 +63,7 @@ impl Problem<'_> {
     }
 
     /// The estimate from the end of stages, and these; `None` where they lead nowhere.
-    pub(super) fn from_stages(&self, begin: Instant, control: &Control) -> Option<(Summary, Led)> {
+    pub(super) fn searched_in_stages(&self, begin: Instant, control: &Control) -> Option<(Summary, Led)> {
         // A checkpoint is that of the search before.
         let settings = Settings { checkpoint: None, ..self.settings.clone() };
         let problem = Problem { settings, ..self.clone() };

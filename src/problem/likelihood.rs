@@ -52,11 +52,11 @@ impl Task for Likelihood<'_> {
                     v.select_eq(zero, zero, error).store(&mut variances[at..]);
                 }
             }
-            for lane in lanes - lanes % W::LANES..lanes {
+            for (lane, sum) in sums.iter_mut().enumerate().skip(lanes - lanes % W::LANES) {
                 for at in (last + lane..rows.len()).step_by(width) {
                     let (square, v) = (rows[at] * rows[at], variances[at]);
                     if v != 0.0 {
-                        sums[lane] += square + v.ln();
+                        *sum += square + v.ln();
                         variances[at] = (square - 1.0) * FRAC_1_SQRT_2;
                     }
                 }
@@ -77,7 +77,7 @@ mod tests {
         let (lanes, columns, samples) = (9, 2, 20);
         for wide in [1.0, 60.0] {
             let z = |k: usize, lane: usize| 0.5 + (k * lane % 24) as f64 / 2.0;
-            let v = |k: usize, lane: usize| match k == 7 && lane % 2 == 0 {
+            let v = |k: usize, lane: usize| match k == 7 && lane.is_multiple_of(2) {
                 true => 0.0,
                 false => 10f64.powf(wide * ((k + 3 * lane) % 11) as f64 / 5.0 - wide),
             };
