@@ -214,20 +214,24 @@ impl Equations {
 
     /// The values of roots; without time, states and inputs for what depends on parameters alone.
     fn values<S: Scalar>(&self, roots: &[Id], at: Option<(S, &[S], &[S])>, p: &[S], to: &mut [S]) {
-        let found = evaluate(&self.graph, roots, at, p);
-        to.iter_mut().zip(found).for_each(|(to, found)| *to = found);
+        self.graph.evaluate_into(roots, to, |leaf| given(leaf, at, p));
     }
 }
 
-/// The values of a graph's roots at a time, a state and inputs, and at parameters; NaN of what is not given, such as an empty state.
+/// The values of a graph's roots at a time, a state and inputs, and at parameters.
 fn evaluate<S: Scalar>(graph: &Graph, roots: &[Id], at: Option<(S, &[S], &[S])>, p: &[S]) -> Vec<S> {
-    graph.evaluate(roots, |leaf| match (leaf, at) {
+    graph.evaluate(roots, |leaf| given(leaf, at, p))
+}
+
+/// The value of a leaf; NaN of what is not given, such as an empty state.
+fn given<S: Scalar>(leaf: Leaf, at: Option<(S, &[S], &[S])>, p: &[S]) -> S {
+    match (leaf, at) {
         (Leaf::Parameter(i), _) => p[i as usize],
         (Leaf::Time, Some((t, ..))) => t,
         (Leaf::State(i), Some((_, x, _))) if !x.is_empty() => x[i as usize],
         (Leaf::Input(i), Some((_, _, u))) => u[i as usize],
         _ => S::from(f64::NAN),
-    })
+    }
 }
 
 /// The name of a leaf by a layout.

@@ -22,17 +22,26 @@ impl Graph {
         }
     }
 
-    /// The value of one root, of a small graph without an allocation.
-    pub(crate) fn value(&self, root: Id, mut leaf: impl FnMut(Leaf) -> f64) -> f64 {
-        const SMALL: usize = 128;
+    /// The values of the roots in `to`, of a small graph without an allocation.
+    pub(crate) fn evaluate_into<S: Scalar>(&self, roots: &[Id], to: &mut [S], mut leaf: impl FnMut(Leaf) -> S) {
+        const SMALL: usize = 64;
         if self.len() > SMALL {
-            return self.evaluate(&[root], leaf).first().copied().unwrap_or(f64::NAN);
+            to.iter_mut().zip(self.evaluate(roots, leaf)).for_each(|(to, value)| *to = value);
+            return;
         }
-        let mut values = [f64::NAN; SMALL];
+        let mut values = [S::from(f64::NAN); SMALL];
         for (i, node) in self.nodes().iter().enumerate() {
             values[i] = self.compute(node, |id| values[id.index()], &mut leaf);
         }
-        values.get(root.index()).copied().unwrap_or(f64::NAN)
+        let value = |root: &Id| values.get(root.index()).copied().unwrap_or(S::from(f64::NAN));
+        to.iter_mut().zip(roots).for_each(|(to, root)| *to = value(root));
+    }
+
+    /// The value of one root.
+    pub(crate) fn value(&self, root: Id, leaf: impl FnMut(Leaf) -> f64) -> f64 {
+        let mut value = [f64::NAN];
+        self.evaluate_into(&[root], &mut value, leaf);
+        value[0]
     }
 
     /// The value of a node, from those of its operands.
