@@ -242,10 +242,11 @@ impl<'a, M: Made> Fit<'a, M> {
     /// with a short memory are nearly linear in the parameters, where a simulation would leave the measurements, diverge, or end in one of
     /// many minima.
     ///
-    /// Without it, a fit does so by itself where the declared start cannot be simulated by any of its methods, and where its search leaves an output
-    /// unexplained and those from further starts, if records are short, find nothing usable; after `starts(1)` it does not. A
-    /// fit that was asked for stages searches from no further starts by itself. A start is kept where a simulation from the end of its stages is
-    /// no nearer to the measurements. Stages need a model that can be read as a graph, of one to six states, an integrator of fixed steps, a
+    /// A fit goes in stages without being asked where the declared start cannot be simulated by any of its methods. It does so, too, where its search
+    /// leaves an output unexplained: after searches from further starts that find nothing usable, in their place where records are long. After
+    /// `starts(1)` it does neither. A fit that was asked for stages searches from no further starts by itself.
+    ///
+    /// A start is kept where a simulation from the end of its stages is no nearer to the measurements. Stages need a model that can be read as a graph, of one to six states, an integrator of fixed steps, a
     /// simulation to be predicted ([`FreeRun`](crate::FreeRun), the default), and no pre-filter; the estimate says what came of them
     /// ([`WarningCode::Staged`](crate::WarningCode::Staged)). Their evaluations are counted, their trial steps (100 each at most) are not.
     ///

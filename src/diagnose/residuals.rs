@@ -84,8 +84,8 @@ pub struct Residuals {
     pub tests: Vec<Test>,
 }
 
-/// Examines the residuals of a prediction of a record, output by output. Those of a filter are in units of their predicted deviations, times the root of
-/// the mean square of these, so that a level of noise that moves is none of the findings; outliers are told in the unit of the output.
+/// Examines the residuals of a prediction of a record, output by output. Those of a filter are divided by their predicted deviations first, and
+/// multiplied by the rms of these: a noise level that varies as predicted is no finding. Outliers are in the unit of the output.
 ///
 /// # Errors
 /// A prediction that is not of this record, or a prediction that is infinite. Too few residuals for a test (fewer than

@@ -118,7 +118,8 @@ pub enum WarningCode {
     /// An initial state that neither the user nor the outputs give a start for.
     GuessedStart,
     /// The search began at the end of stages ([`Fit::staged`](crate::Fit::staged)), which were asked for, or taken since the declared start
-    /// cannot be simulated; or why it did not; or a simulation from the declared start explains nothing and a lower minimum may lie elsewhere.
+    /// cannot be simulated; or why it did not; or a lower minimum may lie elsewhere, since a simulation from the declared start is far off and
+    /// the errors are colored.
     Staged,
     /// Time jumps within a record.
     TimeGaps,

@@ -63,7 +63,8 @@ pub(super) enum Way {
 }
 
 impl Way {
-    /// Whether stages led to what explains all outputs. The search from their end may have met the roughness of a chaotic plant's cost.
+    /// Whether stages led to an estimate that explains all outputs. It is taken also where its search has not converged, as is common on the
+    /// rough cost of a chaotic plant.
     fn explains(&self, best: &Summary) -> bool {
         matches!(self, Way::Stages(_)) && !leaves_unexplained(best)
     }
@@ -139,31 +140,34 @@ impl Problem<'_> {
     ) -> Option<Summary> {
         let searched = self.searched(found, further, control);
         let searched = self.compared_with_simulation(searched.as_ref().unwrap_or(found), control).or(searched);
-        match self.began_anywhere(searched.as_ref().unwrap_or(found), control) {
+        match self.may_be_local(searched.as_ref().unwrap_or(found), control) {
             Some(note) => Some(noted(searched.unwrap_or_else(|| found.clone()), Some(note))),
             None => searched,
         }
     }
 
-    /// A note where nothing tells that the minimum is the lowest: it is the only one that was searched for, from a start that explains nothing,
-    /// and its errors are colored, as they are in a wrong one.
-    fn began_anywhere(&self, found: &Summary, control: &Control) -> Option<Warning> {
+    /// A note that the minimum may be a local one: a single search led to it from a start whose simulation is far off, and its errors are colored, as
+    /// those of a local minimum are.
+    fn may_be_local(&self, found: &Summary, control: &Control) -> Option<Warning> {
         let colored =
             |warning: &Warning| warning.code == WarningCode::ColoredErrors && warning.severity > Severity::Usable;
-        let searched = |warning: &Warning| warning.code == WarningCode::Unexplained && warning.about == About::Search;
+        let searched = |warning: &Warning| {
+            warning.code == WarningCode::Staged
+                || warning.code == WarningCode::Unexplained && warning.about == About::Search
+        };
         let single = self.settings.searches == SearchPlan::Single && !self.settings.staged;
         if !single
             || self.sweep.restarts().is_some()
             || self.sweep.predicts_variance()
-            || control.stops()
+            || self.layout().states.is_empty()
             || !found.warnings.iter().any(colored)
             || found.warnings.iter().any(searched)
-            || self.start_explains(control)
+            || self.start_explains(control) != Some(false)
         {
             return None;
         }
-        let text = "a simulation from the declared start explains nothing, and the errors where the search ended are colored: a lower minimum may lie elsewhere; \
-                    Fit::staged and Fit::starts look for it";
+        let text = "a simulation from the declared start is off by more than a quarter of an output's range (rms), and the errors where the search \
+                    ended are colored: a lower minimum may lie elsewhere; Fit::staged and Fit::starts look for it";
         Some(Warning::new(WarningCode::Staged, Severity::Usable, text.to_owned()).about(About::Search))
     }
 
@@ -186,8 +190,8 @@ impl Problem<'_> {
         Some(Summary { seconds: found.seconds + begin.elapsed().as_secs_f64(), ..best })
     }
 
-    /// Searches from further starts where an estimate leaves an output unexplained, and in stages where these find nothing usable or
-    /// records are long. They run by the default method; the best minimum goes on by finer ones where only the step is wrong with it. `None` where stages or
+    /// Searches from further starts where an estimate leaves an output unexplained, and in stages where these find nothing usable or records are
+    /// long. They run by the default method; the best minimum goes on by finer ones where only the step is wrong with it. `None` where stages or
     /// a number of starts were asked for, where the measurements tell nothing by any parameters, and where the variance is predicted: that
     /// likelihood has no bound at noise levels of zero, which some start would find.
     pub(super) fn search_further(&self, found: &Summary, control: &Control) -> Option<Further> {
@@ -222,17 +226,18 @@ impl Problem<'_> {
         if is_only_coarse(&again) {
             again = self.refined(Ok(again), 0, begin, control).ok()?;
         }
-        if again.severity() == Severity::NotUsable
-            && !control.stops()
-            && let Some((best, led)) = self.searched_in_stages(begin, control)
-            && is_found(&best, &again)
-        {
-            let evaluations = best.evaluations + again.evaluations;
-            let iterations = best.iterations + again.iterations;
-            let best = Summary { evaluations, iterations, ..best };
-            return Some(as_further(best, Way::Stages(led.stages)));
+        if again.severity() < Severity::NotUsable || control.stops() {
+            return Some(as_further(again, Way::Starts));
         }
-        Some(as_further(again, Way::Starts))
+        let Some((best, led)) = self.searched_in_stages(begin, control) else {
+            return Some(as_further(again, Way::Starts));
+        };
+        let (iterations, evaluations) = (best.iterations + again.iterations, best.evaluations + again.evaluations);
+        let (best, way) = match is_found(&best, &again) {
+            true => (best, Way::Stages(led.stages)),
+            false => (again, Way::Starts),
+        };
+        Some(as_further(Summary { iterations, evaluations, ..best }, way))
     }
 
     /// Whether several pieces of records like the first one run together in vector registers.
@@ -249,8 +254,8 @@ pub(super) fn leaves_unexplained(found: &Summary) -> bool {
     found.severity() == Severity::NotUsable && found.warnings.iter().any(unexplained)
 }
 
-/// Whether stages found what searches from further starts did not: something usable, or what explains all outputs, with errors of half the size or less.
-/// Deviances that differ by less may be those of other steps.
+/// Whether the estimate from the end of stages replaces that of further starts, which is not usable: it is usable, or explains all outputs where the
+/// other does not or has errors of twice the size. A smaller difference may come from the step of the integrator.
 fn is_found(staged: &Summary, again: &Summary) -> bool {
     let halved = 4f64.ln() * staged.measurements as f64;
     let lower = || staged.deviance.zip(again.deviance).is_some_and(|(staged, again)| staged < again - halved);
@@ -353,22 +358,53 @@ mod tests {
         assert!(said && found.severity() < Severity::NotUsable, "{found}");
     }
 
-    /// Errors of the shape of a slow sine, a fifth of what the output moves: from a gain fifty times too large, which explains nothing, a note says that a lower
-    /// minimum may lie elsewhere; from a gain that is nearly right, and of starts that were asked for, there is none.
+    /// A current that decays.
+    #[derive(Clone)]
+    struct Coil;
+
+    impl Model for Coil {
+        type State = Current;
+        type Input = Voltage;
+        type Output = Current;
+        type Parameters = Gain;
+
+        fn derivative<S: Scalar>(&self, _t: S, x: &Current<S>, u: &Voltage<S>, p: &Gain<S>) -> Current<S> {
+            Current { i: u.u - p.a * x.i }
+        }
+        fn output<S: Scalar>(&self, _t: S, x: &Current<S>, _u: &Voltage<S>, _p: &Gain<S>) -> Current<S> {
+            *x
+        }
+    }
+
+    fn is_noted(found: &Summary) -> bool {
+        assert!(found.warnings.iter().any(|warning| warning.code == WarningCode::ColoredErrors), "{found}");
+        found.warnings.iter().any(|warning| warning.text.contains("a lower minimum may lie elsewhere"))
+    }
+
+    /// Errors of the shape of a slow sine, a fifth of what the output moves: from a decay a hundred times too slow, whose simulation is off by many
+    /// times the range, a note says that a lower minimum may lie elsewhere; from a decay that is nearly right there is none, nor of starts that were
+    /// asked for.
     #[test]
     fn a_start_that_explains_nothing_is_told_where_errors_are_colored() {
+        let time = Time::Uniform { start: 0.0, step: 0.1 };
+        let inputs: Vec<Voltage> = (0..600).map(|k| Voltage { u: f64::from(u8::from(k / 40 % 2 == 0)) }).collect();
+        let run = crate::simulate(&Coil, &Gain { a: 2.0 }, &Current { i: 0.0 }, time.clone(), &inputs).unwrap();
+        let outputs = run.outputs.iter().enumerate();
+        let outputs = outputs.map(|(k, y)| Current { i: y.i + 0.1 * (k as f64 * 0.05).sin() }).collect();
+        let record = Experiment::new(&Coil, time, inputs, outputs).unwrap();
+        let fit = |start: f64| Fit::new(&Coil, &record).parameters(Gain { a: free(start) });
+        let noted = [fit(0.02), fit(1.9), fit(0.02).starts(4)].map(|fit| is_noted(&fit.run().unwrap()));
+        assert_eq!(noted, [true, false, false]);
+    }
+
+    /// A model without states and linear in its parameter has one minimum: no note.
+    #[test]
+    fn a_line_has_one_minimum() {
         let inputs: Vec<Voltage> = (0..400).map(|k| Voltage { u: f64::from(k * 37 % 21) - 10.0 }).collect();
-        let outputs = (0..400).map(|k| Current { i: 2.0 * inputs[k].u + 4.0 * (k as f64 * 0.05).sin() }).collect();
-        let record = Experiment::new(&Line, Time::Uniform { start: 0.0, step: 1.0 }, inputs.clone(), outputs).unwrap();
-        let said = |start: f64, count: Option<usize>| {
-            let fit = Fit::new(&Line, &record).parameters(Gain { a: free(start) });
-            let found = if let Some(count) = count { fit.starts(count).run() } else { fit.run() }.unwrap();
-            assert!(
-                (found.parameters.a / 2.0 - 1.0).abs() < 0.05 && found.severity() == Severity::UsableWithCare,
-                "{found}"
-            );
-            found.warnings.iter().any(|warning| warning.text.contains("a lower minimum may lie elsewhere"))
-        };
-        assert_eq!([said(100.0, None), said(2.1, None), said(100.0, Some(4))], [true, false, false]);
+        let outputs = inputs.iter().enumerate();
+        let outputs = outputs.map(|(k, u)| Current { i: 2.0 * u.u + 4.0 * (k as f64 * 0.05).sin() }).collect();
+        let record = Experiment::new(&Line, Time::Uniform { start: 0.0, step: 1.0 }, inputs, outputs).unwrap();
+        let found = Fit::new(&Line, &record).parameters(Gain { a: free(100.0) }).run().unwrap();
+        assert!(!is_noted(&found), "{found}");
     }
 }

@@ -84,13 +84,14 @@ impl Problem<'_> {
         is_compiled.then_some(stages).ok_or(reason)
     }
 
-    /// Whether a simulation from the declared start explains the outputs, to half their range.
-    pub(super) fn start_explains(&self, control: &Control) -> bool {
+    /// Whether a simulation from the declared start explains the outputs: its rms errors are below a quarter of their ranges. `None` where it cannot be
+    /// evaluated.
+    pub(super) fn start_explains(&self, control: &Control) -> Option<bool> {
         let explained = |(j, error): (usize, f64)| {
             let moves = Moves::of(self.records.iter().map(|record| (record, &record.outputs()[j])));
             moves.half == 0.0 || error <= UNEXPLAINED * moves.half
         };
-        errors(self, &self.start(), control).is_some_and(|errors| errors.into_iter().enumerate().all(explained))
+        Some(errors(self, &self.start(), control)?.into_iter().enumerate().all(explained))
     }
 
     /// The size of each state: of those that the outputs give, what moves these by half their range; of the others, what moves the derivatives of

@@ -13,10 +13,11 @@ const ROWS: usize = 256;
 /// Absorbs the rows of jobs that run in parallel lanes.
 pub(super) struct Absorber<'o> {
     weighing: Vec<Weighing<'o>>,
-    /// Whether there is neither a loss nor a weight: the cost is the plain sum of squares, with that of the logarithms of predicted variances.
+    /// Whether there is neither a loss nor a weight: the cost is half the sum of squares, plus that of the logarithms of variances where these are
+    /// predicted.
     plain: bool,
     rows: Vec<u64>,
-    /// Plain sums, lane by lane.
+    /// Twice that cost, for each lane.
     sums: Vec<f64>,
     columns: usize,
     triangles: Option<Triangles>,

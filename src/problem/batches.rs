@@ -95,6 +95,13 @@ pub(super) fn run(jobs: &[&Job<'_>], show: &mut dyn FnMut(&mut Window)) -> Resul
     }
 }
 
+/// Runs the jobs of a batch for the carries at their ends alone.
+pub(super) fn ends(jobs: &[&Job<'_>]) -> Vec<Result<Reached, RunError>> {
+    let pieces: Vec<Piece<'_>> = jobs.iter().map(|job| job.piece.lent()).collect();
+    let Job { objective, seeds, .. } = jobs[0];
+    objective.sweep.run(&pieces, seeds, &mut |_| !objective.control.stops())
+}
+
 /// `f(0), f(1), ...`, in parallel where the feature `parallel` is on; in order.
 pub(crate) fn each<T: Send>(n: usize, f: impl Fn(usize) -> T + Send + Sync) -> Vec<T> {
     #[cfg(feature = "parallel")]

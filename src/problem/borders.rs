@@ -1,6 +1,6 @@
 //! Where the segments of a record begin at a point that is to be evaluated: guessed, corrected, or simulated.
 
-use super::batches::{each, in_batches};
+use super::batches::{each, ends, in_batches};
 use super::job::Job;
 use super::linearize::Triangulation;
 use super::segments::Borders;
@@ -175,15 +175,13 @@ impl Objective<'_> {
         let jobs: Vec<Job<'_>> = (0..self.experiments()).flat_map(run_in).collect();
         // A run that fails leaves its begin as the guess.
         let end = |_: &[usize], jobs: &[&Job<'_>]| {
-            let pieces: Vec<Piece<'_>> = jobs.iter().map(|job| job.piece.lent()).collect();
-            let reached = self.sweep.run(&pieces, &[], &mut |_| !self.control.stops());
-            let end = |(reached, piece): (Result<Reached, RunError>, Piece<'_>)| {
-                reached.unwrap_or_else(|_| Reached { carry: piece.carry.into_owned(), slopes: vec![] })
+            let end = |(reached, job): (Result<Reached, RunError>, &&Job<'_>)| {
+                reached.unwrap_or_else(|_| Reached { carry: job.piece.carry.to_vec(), slopes: vec![] })
             };
-            Ok(reached.into_iter().zip(pieces).map(end).collect())
+            Ok(ends(jobs).into_iter().zip(jobs).map(end).collect())
         };
-        let mut ends = in_batches(&jobs, end).unwrap_or_default().into_iter();
-        let of_record = |segments: &Vec<_>| ends.by_ref().take(segments.len() - 1).collect();
+        let mut found = in_batches(&jobs, end).unwrap_or_default().into_iter();
+        let of_record = |segments: &Vec<_>| found.by_ref().take(segments.len() - 1).collect();
         let of = self.problem.cuts.segments.iter().map(of_record).collect();
         Borders {
             point: coordinates.to_vec(),

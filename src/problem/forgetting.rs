@@ -1,7 +1,8 @@
-//! Segments of a record whose begin a filter forgets. Each is run from a guess some samples before it, its run-in, with slopes with respect to the
-//! unknowns alone: the influence of the guess decays in the run-in, which is tested where the segment before ends.
+//! Segments of a record for filters whose state depends on recent measurements only. Each segment is preceded by a run-in: the last samples of the
+//! segment before, run from a guess. The influence of the guess decays there, so that no slopes with respect to the begin of the segment are needed.
+//! Whether it has decayed is tested: the segment before has to end where the run-in ends.
 
-use super::batches::{Broken, in_batches};
+use super::batches::{Broken, ends, in_batches};
 use super::job::Job;
 use super::linearize::{Part, Triangulation, parts};
 use super::segments::{Borders, RunIns};
@@ -11,31 +12,31 @@ use crate::optimize::Infeasible;
 use crate::sweep::{Piece, Reached, RunError};
 use std::ops::Range;
 
-/// Parts of a segment that a run-in may take, tried one after the other.
+/// A run-in is a quarter of a segment; half of one where a quarter is too short.
 const PARTS: [usize; 2] = [4, 2];
-/// A segment begins where the one before ended if no entry of the carry differs by more than this part of its largest magnitude, and no slope by more than
-/// that part of the largest one of its column. Values are right to rounding at the first point and where a search ends, since the guesses are simulated
-/// there, and move by less and less; slopes are as good where the search ends.
+/// Two carries are the same where no entry differs by more than this part of its largest magnitude in the record: far less than a step of a search
+/// changes. Where a search begins, guesses are simulated, and where it ends, they hardly move, so that they are right to rounding there.
 const SAME: f64 = 1e-11;
+/// Slopes are the same where none differs by more than this part of the largest one of its column: gradients are as near.
 const SAME_SLOPES: f64 = 1e-9;
 
-/// A record whose segments follow each other.
-struct Chained<'p> {
+/// A record in segments.
+struct Segmented<'p> {
     whole: Job<'p>,
     segments: &'p [Range<usize>],
     /// The begin of the record.
     start: Reached,
-    /// Where the run-ins begin, one for each segment but the first; the segment before is run in two pieces.
+    /// Where the run-in of each segment but the first begins. The segment that holds it is run in two pieces, before and from there.
     run_ins: Vec<usize>,
 }
 
-impl<'p> Chained<'p> {
+impl<'p> Segmented<'p> {
     fn new(mut whole: Job<'p>, segments: &'p [Range<usize>], part: usize) -> Self {
         // Slopes in the quantities themselves; a scale of zero marks a column that is left out.
         whole.scales.iter_mut().filter(|scale| **scale != 0.0).for_each(|scale| *scale = 1.0);
         let start = Reached { carry: whole.piece.carry.to_vec(), slopes: whole.piece.slopes.to_vec() };
         let run_ins = segments.windows(2).map(|pair| pair[0].end - pair[0].len() / part).collect();
-        Chained { whole, segments, start, run_ins }
+        Segmented { whole, segments, start, run_ins }
     }
 
     fn jobs<'s>(&'s self, pieces: impl Iterator<Item = (Range<usize>, &'s Reached)>) -> Vec<Job<'s>> {
@@ -54,20 +55,20 @@ impl<'p> Chained<'p> {
         self.jobs(pieces.map(|((from, segment), guess)| (*from..segment.end, guess)))
     }
 
-    /// The segments up to where the run-in of the next one begins; the last one whole.
+    /// The first pieces of the segments, up to the run-in of the next one; the last segment as a whole.
     fn fronts<'s>(&'s self, begins: &'s [Reached]) -> Vec<Job<'s>> {
         let ends = self.run_ins.iter().copied().chain(self.segments.last().map(|last| last.end));
         let pieces = self.segments.iter().zip(ends).zip(std::iter::once(&self.start).chain(begins));
         self.jobs(pieces.map(|((segment, end), begin)| (segment.start..end, begin)))
     }
 
-    /// The rest of the segments.
+    /// The second pieces.
     fn backs<'s>(&'s self, fronts: &'s [Part]) -> Vec<Job<'s>> {
         let pieces = self.run_ins.iter().zip(self.segments).zip(fronts);
         self.jobs(pieces.map(|((from, segment), front)| (*from..segment.end, &front.reached)))
     }
 
-    /// Whether all segments end where the next ones begin.
+    /// Whether each segment ends where the run-in of the next one ended, so that guesses have no influence.
     fn forgets(&self, ends: &[Part], begins: &[Reached]) -> bool {
         let (entries, seeds) = (self.start.carry.len(), self.whole.seeds.len());
         let pairs = || ends.iter().map(|end| &end.reached).zip(begins);
@@ -92,8 +93,8 @@ impl<'p> Chained<'p> {
 }
 
 impl Objective<'_> {
-    /// Triangles of a filter's likelihood; `None` where nothing is chained, where the filter does not forget in a part of a segment, or where a piece
-    /// cannot be evaluated.
+    /// Triangles of a filter's likelihood; `None` where no record is cut, where guesses still have an influence after the longest run-in, or where a
+    /// piece cannot be evaluated.
     pub(super) fn forgetting(
         &self,
         coordinates: &[f64],
@@ -103,10 +104,10 @@ impl Objective<'_> {
         if !self.sweep.predicts_variance() || !(0..self.experiments()).any(|e| cuts.is_chained(e)) {
             return Ok(None);
         }
-        while let Some(part) = PARTS.get(self.memory.remembered()) {
+        while let Some(part) = PARTS.get(self.memory.run_in()) {
             match self.after_run_ins(coordinates, values, *part) {
                 Ok(Some(found)) => return Ok(Some(found)),
-                Ok(None) => self.memory.remember(),
+                Ok(None) => self.memory.lengthen_run_in(),
                 Err(RunError::Failed { .. }) => break,
                 Err(RunError::Stopped) => return Err(Infeasible::Cancelled),
             }
@@ -114,7 +115,7 @@ impl Objective<'_> {
         Ok(None)
     }
 
-    /// Triangles after run-ins of a part of a segment; `None` where their begins are not forgotten.
+    /// Triangles with run-ins of one `part`-th of a segment; `None` where guesses have an influence after them.
     fn after_run_ins(
         &self,
         coordinates: &[f64],
@@ -122,14 +123,12 @@ impl Objective<'_> {
         part: usize,
     ) -> Result<Option<Triangulation>, RunError> {
         let chain =
-            |e: usize| Chained::new(self.job(e, &values[e], coordinates, true), &self.problem.cuts.segments[e], part);
-        let chains: Vec<Chained<'_>> = (0..self.experiments()).map(chain).collect();
+            |e: usize| Segmented::new(self.job(e, &values[e], coordinates, true), &self.problem.cuts.segments[e], part);
+        let chains: Vec<Segmented<'_>> = (0..self.experiments()).map(chain).collect();
         let guesses = self.before_run_ins(coordinates, values, part, &chains)?;
         let begins = of_records(chains.iter().zip(&guesses).map(|(chain, from)| chain.run_ins(from)), |jobs| {
-            let pieces: Vec<Piece<'_>> = jobs.iter().map(|job| job.piece.lent()).collect();
-            let reached = self.sweep.run(&pieces, &jobs[0].seeds, &mut |_| !self.control.stops());
-            let reached = reached.into_iter().enumerate();
-            reached.map(|(lane, reached)| reached.map_err(|error| Broken { lane, error })).collect()
+            let lanes = ends(jobs).into_iter().enumerate();
+            lanes.map(|(lane, reached)| reached.map_err(|error| Broken { lane, error })).collect()
         })?;
         let fronts = of_records(chains.iter().zip(&begins).map(|(chain, from)| chain.fronts(from)), parts)?;
         let backs = of_records(chains.iter().zip(&fronts).map(|(chain, from)| chain.backs(from)), parts)?;
@@ -162,13 +161,14 @@ impl Objective<'_> {
         Ok(Some(found))
     }
 
-    /// Guesses of where run-ins begin: as another point tells, else simulated, without slopes.
+    /// Guesses of the carries at the begins of run-ins: those of the best point before, moved along their slopes; at the first point simulated, with
+    /// slopes of zero.
     fn before_run_ins(
         &self,
         coordinates: &[f64],
         values: &[Values],
         part: usize,
-        chains: &[Chained<'_>],
+        chains: &[Segmented<'_>],
     ) -> Result<Vec<Vec<Reached>>, RunError> {
         let known = self.memory.at(coordinates).or_else(|| self.memory.best());
         if let Some(from) = known
@@ -180,7 +180,7 @@ impl Objective<'_> {
             };
             return Ok(run_ins.of.iter().enumerate().map(moved).collect());
         }
-        let simulated = |chain: &Chained<'_>| {
+        let simulated = |chain: &Segmented<'_>| {
             if chain.run_ins.is_empty() {
                 return Ok(vec![]);
             }
@@ -241,9 +241,19 @@ mod tests {
 
     /// Measurements that follow no model; every seventh is missing.
     fn record(samples: usize, x: crate::Parameter) -> ExperimentOf<Mass> {
+        record_without(samples, x, 0..0)
+    }
+
+    /// Such a record without measurements in a stretch.
+    fn record_without(samples: usize, x: crate::Parameter, unmeasured: Range<usize>) -> ExperimentOf<Mass> {
         let inputs: Vec<Voltage> = (0..samples).map(|k| Voltage { u: f64::from(k as u32 / 50 % 3) - 0.8 }).collect();
-        let measured =
-            |k: usize| if k % 7 == 3 { f64::NAN } else { (k as f64 * 0.037).sin() + (k * 37 % 21) as f64 * 0.01 };
+        let measured = |k: usize| {
+            if k % 7 == 3 || unmeasured.contains(&k) {
+                f64::NAN
+            } else {
+                (k as f64 * 0.037).sin() + (k * 37 % 21) as f64 * 0.01
+            }
+        };
         let outputs = (0..samples).map(|k| Current { i: measured(k) }).collect();
         let record = Experiment::new(&Mass, Time::Uniform { start: 0.0, step: 0.1 }, inputs, outputs).unwrap();
         record.initial(Motion { x, v: fixed(0.1) })
@@ -259,8 +269,8 @@ mod tests {
         found.blocks.iter().flat_map(of).collect()
     }
 
-    /// Cost and triangles are those of segments with slopes with respect to their begins, as near as run-ins are tested for; at the first point the cost is
-    /// right to rounding of 3,000 terms. A second point begins from what the first one tells. One of the two records is not cut.
+    /// Cost and triangles are those of segments with slopes with respect to their begins, as near as run-ins are tested for; at the first point the
+    /// cost is right to rounding of 3,000 terms. A second point begins from what the first one tells. One of the two records is not cut.
     #[test]
     fn run_ins_change_nothing() {
         let records = [record(3_000, free(0.2)), record(400, free(0.1))];
@@ -271,7 +281,7 @@ mod tests {
             let x: Vec<f64> = objective.start().iter().map(|x| x + moved).collect();
             let values = objective.values(&x);
             let found = objective.forgetting(&x, &values).unwrap().unwrap();
-            assert!(objective.memory.remembered() < PARTS.len());
+            assert!(objective.memory.run_in() < PARTS.len());
             let right = problem.in_units(&Control::NEVER).chaining(&x, &values).unwrap();
             assert!((found.cost / right.cost - 1.0).abs() < rounding, "{} {}", found.cost, right.cost);
             let (found_rows, right) = (rows(&found), rows(&right));
@@ -283,17 +293,22 @@ mod tests {
         }
     }
 
-    /// A filter with hardly any process noise gives every measurement the same weight, so that what it began with matters to the end: that is found, and
-    /// the longer run-in is tried before the segments are chained.
+    /// A filter with hardly any process noise weighs all measurements alike, and one without measurements over two segments follows its begin there:
+    /// guesses keep their influence, which is found, and the longer run-in is tried before the segments are chained. The likelihood is that of
+    /// dual numbers, which run the record as a whole, to rounding.
     #[test]
-    fn what_is_not_forgotten_is_found() {
-        let records = [record(1_000, free(0.2))];
-        let start = Spring { k: free(1.0), c: free(0.3), q: fixed(1e-9), r: free(0.1).log() };
-        let problem = Fit::new(&Mass, &records).parameters(start).predictor(Kalman).problem().unwrap();
-        let objective = problem.in_units(&Control::NEVER);
-        let x = objective.start();
-        assert!(objective.forgetting(&x, &objective.values(&x)).unwrap().is_none());
-        assert_eq!(objective.memory.remembered(), PARTS.len());
-        assert!(objective.evaluate(&x).is_ok());
+    fn guesses_that_keep_their_influence_are_found() {
+        let without_process_noise = Spring { k: free(1.0), c: free(0.3), q: fixed(1e-9), r: free(0.1).log() };
+        let disturbed = Spring { q: free(0.3).log(), ..without_process_noise };
+        for (start, unmeasured) in [(without_process_noise, 0..0), (disturbed, 400..700)] {
+            let records = [record_without(1_000, free(0.2), unmeasured)];
+            let problem = Fit::new(&Mass, &records).parameters(start).predictor(Kalman).problem().unwrap();
+            let objective = problem.in_units(&Control::NEVER);
+            let x = objective.start();
+            assert!(objective.forgetting(&x, &objective.values(&x)).unwrap().is_none());
+            assert_eq!(objective.memory.run_in(), PARTS.len());
+            let (chained, whole) = (objective.evaluate(&x).unwrap().cost, objective.cost_at(&x).unwrap());
+            assert!((chained / whole - 1.0).abs() < 1e-13, "{chained} {whole}");
+        }
     }
 }

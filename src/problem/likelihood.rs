@@ -1,15 +1,15 @@
-//! [`Likelihood`]: the cost of standardized errors with predicted variances, and the errors of the rows of these.
+//! [`Likelihood`]: the sum over errors that were standardized by predicted variances, without loss and weights.
 
 use crate::wide::{Task, Wide};
 use std::f64::consts::FRAC_1_SQRT_2;
 
 /// Rows whose variances are multiplied before a logarithm is taken.
 const ROWS: usize = 8;
-/// The least variance, and its inverse the largest, so that such a product neither overflows nor underflows.
+/// The product of eight variances between this and its inverse is between 1e-296 and 1e296; logarithms of others are summed one by one.
 const SAFE: f64 = 1e-37;
 
-/// Least squares of standardized errors `z` with predicted variances `v`, which are zero where nothing was measured: adds `z^2 + ln v` to the sum of each
-/// lane and puts `(z^2 - 1) / sqrt(2)` in the place of `v`.
+/// For standardized errors `z` and their predicted variances `v`, zero where nothing was measured: adds `z^2 + ln v` to the sum of each lane, and
+/// writes `(z^2 - 1) / sqrt(2)`, the error of the variance's row, over `v`.
 pub(super) struct Likelihood<'l> {
     pub rows: &'l [f64],
     pub variances: &'l mut [f64],

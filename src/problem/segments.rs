@@ -67,7 +67,7 @@ pub(crate) struct Borders {
     pub of: Vec<Vec<Reached>>,
     /// Whether they need no correction: simulated ones, and those of a point that was evaluated, corrected.
     pub right: bool,
-    /// Of a filter that forgets the begins of segments.
+    /// Of a filter, where segments have run-ins.
     pub run_ins: Option<RunIns>,
 }
 
@@ -98,8 +98,8 @@ pub(crate) struct Memory(Mutex<Points>);
 struct Points {
     last: Option<Arc<Borders>>,
     best: Option<Arc<Borders>>,
-    /// How often a filter did not forget the begin of a run-in.
-    remembered: usize,
+    /// How many lengths of run-ins have turned out too short.
+    run_in: usize,
 }
 
 impl Memory {
@@ -129,14 +129,14 @@ impl Memory {
         self.points().best.clone().filter(|borders| borders.has_slopes())
     }
 
-    /// How often a filter did not forget the begin of a run-in.
-    pub fn remembered(&self) -> usize {
-        self.points().remembered
+    /// How many lengths of run-ins have turned out too short.
+    pub fn run_in(&self) -> usize {
+        self.points().run_in
     }
 
-    /// A filter did not forget.
-    pub fn remember(&self) {
-        self.points().remembered += 1;
+    /// One more length is too short.
+    pub fn lengthen_run_in(&self) {
+        self.points().run_in += 1;
     }
 }
 

@@ -136,7 +136,8 @@ fn by_variance(window: &mut Window) -> Result<(), (usize, usize)> {
     Ok(())
 }
 
-/// Divides rows by the roots of variances, and the slopes of these by them; both are zero where nothing was measured.
+/// Divides errors and their slopes by `sqrt(v)`, and slopes of variances by `sqrt(2) v`. Where nothing was measured all of them are zero, `v` too, and
+/// stay so.
 struct ByVariance<'v> {
     rows: &'v mut [f64],
     variances: &'v mut [f64],
