@@ -27,7 +27,7 @@ pub use code::Column;
 pub use group::Group;
 pub use schedule::TooLarge;
 
-use crate::graph::{Leaf, Node, Pattern, Seed};
+use crate::graph::{Following, Leaf, Node, Pattern, Seed};
 use crate::recurrence::Recurrence;
 use crate::wide::Width;
 use choice::Machine;
@@ -79,7 +79,8 @@ fn parameters(recurrence: &Recurrence) -> usize {
         Node::Leaf(Leaf::Parameter(j)) => Some(*j as usize + 1),
         _ => None,
     };
-    recurrence.graph().nodes().iter().filter_map(parameter).max().unwrap_or(0)
+    let written = recurrence.graph().nodes().iter().filter_map(parameter);
+    written.chain(recurrence.following().iter().map(Following::end)).max().unwrap_or(0)
 }
 
 impl Program {

@@ -3,6 +3,7 @@
 mod dead_times;
 mod degree;
 mod diffusion;
+mod linear;
 mod moments;
 mod roots;
 mod slopes;
@@ -11,6 +12,7 @@ mod terms;
 
 pub(crate) use dead_times::DeadTimes;
 pub(crate) use diffusion::Diffusion;
+pub(crate) use linear::Linear;
 pub(crate) use moments::MomentsOf;
 pub use roots::Roots;
 pub(crate) use slopes::{Jacobian, Slopes};
@@ -202,7 +204,7 @@ impl Equations {
 
     /// Whether derivatives and outputs are affine in the states: then so is each step, and slopes do not depend on states.
     pub fn is_affine(&self) -> bool {
-        let degrees = degrees(&self.graph);
+        let degrees = degrees(&self.graph, &|leaf| matches!(leaf, Leaf::State(_)));
         self.roots.moving().iter().all(|root| degrees[root.index()] <= Degree::One)
     }
 

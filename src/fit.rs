@@ -34,7 +34,7 @@ use crate::parameter::Parameter;
 use crate::predict::Predictor;
 use crate::prefilter::Butterworth;
 use crate::problem::{Noise, Problem, Search, SearchPlan, Settings};
-use crate::record::Record;
+use crate::record::{Record, Time};
 use crate::weighting::Weighting;
 use argmin::core::observers::{Observe, ObserverMode};
 use core::marker::PhantomData;
@@ -339,9 +339,12 @@ impl<'a, M: Made> Fit<'a, M> {
     where
         M: 'm,
     {
-        let sweep = M::sweep(model.clone(), self.stepping.as_ref(), self.predictor.as_ref())?;
+        let (chosen, predictor) = (self.stepping.as_ref(), self.predictor.as_ref());
+        let evenly = self.records.iter().all(|record| matches!(record.times(), Time::Uniform { .. }));
+        let stepping = fittable::stepping(&*model, chosen, predictor, evenly);
+        let sweep = M::sweep(model.clone(), stepping.as_ref(), predictor)?;
         let problem = Problem::new(sweep, self.records, &self.parameters, self.settings)?;
-        Ok(problem.refining(fittable::finer(model, self.stepping.as_ref(), self.predictor.as_ref())))
+        Ok(problem.refining(fittable::finer(model, stepping.as_ref(), predictor)))
     }
 }
 

@@ -21,7 +21,7 @@ pub use kalman::Kalman;
 pub use measured::Guess;
 pub(crate) use measured::Place;
 pub use plant::Plant;
-pub(crate) use plant::{Between, SlicePlant, Stepped, jacobian};
+pub(crate) use plant::{Between, Intervals, SlicePlant, Stepped, jacobian};
 pub use second_order::SecondOrder;
 pub use starting::Starting;
 pub(crate) use symbolic::recurrence;

@@ -5,7 +5,7 @@ mod late;
 
 pub(crate) use interval::SymbolicInterval;
 
-use crate::graph::{Graph, Id, Leaf, Node};
+use crate::graph::{Following, Graph, Id, Leaf, Node};
 
 /// A recurrence: what it carries from sample to sample, what it expects of each output.
 ///
@@ -18,6 +18,7 @@ pub struct Recurrence {
     mean: Vec<Id>,
     variance: Vec<Id>,
     started: Started,
+    following: Vec<Following>,
 }
 
 /// What the carry at the first sample depends on.
@@ -58,12 +59,22 @@ impl Recurrence {
     /// A recurrence that carries no outputs.
     pub(crate) fn without_outputs(&self) -> Self {
         let (graph, next) = self.graph.pruned(&self.next);
-        Recurrence { graph, next, mean: vec![], variance: vec![], started: self.started.clone() }
+        Recurrence { graph, next, mean: vec![], variance: vec![], ..self.clone() }
     }
 
     /// This recurrence, which starts so.
     pub(crate) fn started(self, started: Started) -> Self {
         Recurrence { started, ..self }
+    }
+
+    /// This recurrence, with numbers that follow from its parameters and the time between two samples, which is the same everywhere.
+    pub(crate) fn with_following(self, following: Vec<Following>) -> Self {
+        Recurrence { following, ..self }
+    }
+
+    /// The numbers that follow from its parameters.
+    pub(crate) fn following(&self) -> &[Following] {
+        &self.following
     }
 
     /// This recurrence, from a state that depends on all parameters.
@@ -100,7 +111,14 @@ impl Recurrence {
         let (next, rest) = roots.split_at(next.len());
         let (mean, variance) = rest.split_at(mean.len());
         let started = Started { states: next.len(), ..Started::default() };
-        Ok(Recurrence { next: next.to_vec(), mean: mean.to_vec(), variance: variance.to_vec(), graph, started })
+        Ok(Recurrence {
+            next: next.to_vec(),
+            mean: mean.to_vec(),
+            variance: variance.to_vec(),
+            graph,
+            started,
+            following: vec![],
+        })
     }
 
     /// The arithmetic.

@@ -1,5 +1,9 @@
 //! [`Transition`]: a state with constant slopes over an interval, exactly.
 
+mod crossing;
+
+pub(crate) use crossing::Crossing;
+
 use crate::scalar::Scalar;
 
 /// `A h` of a first step is no larger than this, by the growth of its absolute values.
@@ -8,14 +12,20 @@ const SHORT: f64 = 1.0 / 16.0;
 const TERMS: usize = 10;
 /// Doublings in which a stable plant must come to rest: the slowest and the fastest time constant are up to a factor of some 1e10 apart.
 const DOUBLINGS: usize = 40;
+/// Doublings of a first step at most: an interval is up to 1e28 times as long as the fastest time constant.
+const LONGEST: f64 = 100.0;
 /// A transition is at rest where all products of an entry and its mirror image are below this, and has run away where one is above its inverse.
 const REST: f64 = 1e-20;
 
-/// Over an interval `h` of `dx = A x dt + dw`: what is added to the state, `e^{Ah} - I`, which unlike `e^{Ah}` keeps the digits of slow
-/// modes, and the covariance that the noise leaves, the integral of `e^{As} Q e^{A's}` over it. Row by row.
+/// Over an interval `h` of `dx = (A x + b) dt + dw`: what is added to the state, `e^{Ah} - I`, which unlike `e^{Ah}` keeps the digits of slow
+/// modes; what a constant `b` adds, `F(h)`, the integral of `e^{As}` over it, and what one adds that grows from zero to `b`, the integral of
+/// `F(s)` by `h`; and the covariance that the noise leaves, the integral of `e^{As} Q e^{A's}`. Row by row.
 pub(crate) struct Transition<S> {
     n: usize,
+    length: S,
     added: Vec<S>,
+    constant: Vec<S>,
+    ramp: Vec<S>,
     covariance: Vec<S>,
 }
 
@@ -31,28 +41,37 @@ impl<S: Scalar> Transition<S> {
     /// Over one step of a discrete plant, `x[k+1] = a x[k] + w`; `q` is the covariance of `w`.
     pub fn discrete(n: usize, mut a: Vec<S>, q: Vec<S>) -> Self {
         a.iter_mut().step_by(n + 1).for_each(|a| *a -= 1.0);
-        Transition { n, added: a, covariance: q }
+        let none = vec![S::from(0.0); n * n];
+        Transition { n, length: S::from(1.0), added: a, constant: none.clone(), ramp: none, covariance: q }
     }
 
-    /// Over an interval; by the series of both over a part of it that is short, which is then doubled (C. F. Van Loan, IEEE Transactions
-    /// on Automatic Control 23 (1978) 395-404, without the exponential of `-A`, which overflows where the plant is stiff).
+    /// Over an interval; by the series of all four over a part of it that is short, which is then doubled (C. F. Van Loan, IEEE Transactions
+    /// on Automatic Control 23 (1978) 395-404, without the exponential of `-A`, which overflows where the plant is stiff). Not a number where
+    /// the interval is too long for that.
     pub fn over(n: usize, a: &[S], q: &[S], h: S) -> Self {
         let values: Vec<f64> = a.iter().map(Scalar::value).collect();
-        let halvings = (growth(n, &values) * h.value() / SHORT).log2().ceil().clamp(0.0, DOUBLINGS as f64);
-        let short = h * (-halvings).exp2();
+        let halvings = (growth(n, &values) * h.value() / SHORT).log2().ceil().max(0.0);
+        let short = if halvings <= LONGEST { h * (-halvings).exp2() } else { S::from(f64::NAN) };
         let ah: Vec<S> = a.iter().map(|a| *a * short).collect();
         let (mut power, mut added) = (ah.clone(), ah.clone());
+        let first = |k: usize| move |at: usize| S::from(f64::from(u8::from(at % (n + 1) == 0)) / k as f64);
+        let (mut constant, mut ramp): (Vec<S>, Vec<S>) =
+            ((0..n * n).map(first(1)).collect(), (0..n * n).map(first(2)).collect());
         let mut term: Vec<S> = q.iter().map(|q| *q * short).collect();
         let mut covariance = term.clone();
         for k in 2..=TERMS + 1 {
+            // The term before this one, divided by the next numbers.
+            constant.iter_mut().zip(&power).for_each(|(sum, term)| *sum += *term / k as f64);
+            ramp.iter_mut().zip(&power).for_each(|(sum, term)| *sum += *term / (k * (k + 1)) as f64);
             power = product(n, &ah, &power).iter().map(|entry| *entry / k as f64).collect();
             let turned = product(n, &ah, &term);
             term = (0..n * n).map(|at| (turned[at] + turned[at % n * n + at / n]) / k as f64).collect();
             added.iter_mut().zip(&power).for_each(|(sum, term)| *sum += *term);
             covariance.iter_mut().zip(&term).for_each(|(sum, term)| *sum += *term);
         }
-        let mut transition = Transition { n, added, covariance };
-        (0..halvings as usize).for_each(|_| transition.double());
+        constant.iter_mut().chain(&mut ramp).for_each(|entry| *entry *= short);
+        let mut transition = Transition { n, length: short, added, constant, ramp, covariance };
+        (0..halvings.min(LONGEST) as usize).for_each(|_| transition.double());
         transition
     }
 
@@ -96,10 +115,28 @@ impl<S: Scalar> Transition<S> {
         self.covariance
     }
 
+    /// What happens to a state and its covariance.
+    pub fn crossing(self) -> Crossing<S> {
+        let Transition { n, added, constant, ramp, covariance, .. } = self;
+        let kept = added.into_iter().enumerate().map(|(at, added)| if at % (n + 1) == 0 { added + 1.0 } else { added });
+        let all = |entries: Vec<S>| entries.into_iter().map(Some).collect();
+        Crossing {
+            n,
+            kept: kept.map(Some).collect(),
+            constant: all(constant),
+            ramp: all(ramp),
+            covariance: all(covariance),
+        }
+    }
+
     /// Twice the interval.
     fn double(&mut self) {
-        let Transition { n, added, covariance } = self;
+        let Transition { n, length, added, constant, ramp, covariance } = self;
         let n = *n;
+        *length = *length * 2.0;
+        let (of_constant, of_ramp) = (product(n, added, constant), product(n, constant, constant));
+        ramp.iter_mut().zip(of_ramp).for_each(|(ramp, square)| *ramp += square / *length);
+        constant.iter_mut().zip(of_constant).for_each(|(constant, moved)| *constant = *constant * 2.0 + moved);
         let moved = product(n, added, covariance);
         // D P D'
         let twice = |at: usize| (0..n).map(|k| moved[at / n * n + k] * added[at % n * n + k]).sum::<S>();
@@ -165,6 +202,44 @@ mod tests {
             let digits = 1e-12 * c * unit * part(2.0 * m) / cross;
             assert!((found[1] / cross - 1.0).abs() < digits.max(1e-12), "{h}: {} {cross}", found[1]);
         }
+    }
+
+    /// A rate that is constant, and one that grows: `F A = e^{Ah} - I` and `R A h = F - h I` whatever the plant, and for a state alone with
+    /// `dx = -l x dt + ...` the integrals `(1 - e^{-lh}) / l` and `(h - F) / lh`.
+    #[test]
+    fn of_constant_and_of_growing_rates() {
+        let (l, m, unit) = (1.0 / 20.0, 1.0 / 172_800.0, 1e6);
+        let a = [-l, l * unit, 0.0, -m];
+        for h in [1e-3, 1.0, 900.0, 1e6] {
+            let Transition { added, constant, ramp, .. } = Transition::over(2, &a, &[0.0; 4], h);
+            for (at, rate) in [(0, l), (3, m)] {
+                let integral = -f64::exp_m1(-rate * h) / rate;
+                assert!((constant[at] / integral - 1.0).abs() < 1e-13, "{h}: {} {integral}", constant[at]);
+                // The difference of the two integrals loses the digits that the series keeps.
+                let growing = if rate * h < 0.01 {
+                    h * (0.5 - rate * h / 6.0 + (rate * h).powi(2) / 24.0)
+                } else {
+                    (h - integral) / (rate * h)
+                };
+                assert!((ramp[at] / growing - 1.0).abs() < 1e-8, "{h}: {} {growing}", ramp[at]);
+            }
+            let [of_constant, of_ramp] = [&constant, &ramp].map(|matrix| product(2, matrix, &a));
+            for at in 0..4 {
+                let size = |of: &[f64]| of[at].abs().max(f64::MIN_POSITIVE);
+                assert!((of_constant[at] - added[at]).abs() < 1e-11 * size(&added), "{h}, {at}: {}", of_constant[at]);
+                let grown = constant[at] - if at % 3 == 0 { h } else { 0.0 };
+                // What is left of two numbers as large as the interval.
+                assert!((of_ramp[at] * h - grown).abs() < 1e-11 * (grown.abs() + h), "{h}, {at}: {}", of_ramp[at]);
+            }
+        }
+    }
+
+    /// An interval that is too long against the fastest time constant is crossed by nothing, not by a series that does not converge.
+    #[test]
+    fn of_intervals_that_are_too_long() {
+        let end = |rate: f64| Transition::over(1, &[-rate], &[1.0], 1.0).covariance()[0];
+        assert!((end(1e20) * 2e20 - 1.0).abs() < 1e-12, "{}", end(1e20));
+        assert!(end(1e40).is_nan() && end(f64::INFINITY).is_nan() && end(f64::NAN).is_nan());
     }
 
     /// Integrators, and one that is slower than the fastest state by more than can be told, do not come to rest; nor does a growing state,

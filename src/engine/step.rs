@@ -34,8 +34,9 @@ impl Step {
         let roots = tape.import(recurrence.graph(), &all);
         let (next, outputs) = roots.split_at(recurrence.next().len());
         let starts = |entry: usize, leaf: Leaf| recurrence.starts_from(entry, leaf);
-        let pattern = Pattern::new(&mut tape, next, seeds, &starts);
-        let attempt = best(&tape, outputs, next, seeds, &pattern);
+        let pattern = Pattern::new(&mut tape, next, seeds, recurrence.following(), &starts);
+        let variables = |tape: &mut Tape| Variables::new(tape, seeds, &pattern, recurrence.following());
+        let attempt = best(&tape, [outputs, next], seeds.len(), &variables);
         let mut values: Vec<Id> = next.to_vec();
         for (row, tangent) in pattern.rows.iter().zip(&attempt.next) {
             let there = row.iter().zip(tangent).filter(|(at, _)| at.is_some());
@@ -58,16 +59,16 @@ impl Step {
 }
 
 /// The slopes of fewest instructions, of rows and of what is carried.
-fn best(tape: &Tape, outputs: &[Id], next: &[Id], seeds: &[Seed], pattern: &Pattern) -> Attempt {
+fn best(tape: &Tape, [outputs, next]: [&[Id]; 2], seeds: usize, variables: &dyn Fn(&mut Tape) -> Variables) -> Attempt {
     let attempt = |of_rows: Way, of_next: Way| {
         let mut tape = tape.clone();
-        let variables = Variables::new(&mut tape, seeds, pattern);
+        let variables = variables(&mut tape);
         let zero = tape.constant(0.0);
         let rows = slopes(&mut tape, outputs, &variables, of_rows);
         let next = slopes(&mut tape, next, &variables, of_next);
         Attempt { tape, rows, next, zero }
     };
-    if seeds.is_empty() {
+    if seeds == 0 {
         return attempt(Way::Carried, Way::Carried);
     }
     let count = |attempt: &Attempt, tangents: &[Tangent], values: &[Id]| {

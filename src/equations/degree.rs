@@ -1,8 +1,8 @@
-//! The degree of equations in the states.
+//! The degree of equations in some of their quantities.
 
 use crate::graph::{Graph, Id, Leaf, Node};
 
-/// How a node depends on the states.
+/// How a node depends on the quantities.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Degree {
     Zero,
@@ -10,8 +10,9 @@ pub(super) enum Degree {
     Higher,
 }
 
-/// The degree of each node in the states.
-pub(super) fn degrees(graph: &Graph) -> Vec<Degree> {
+/// The degree of each node in the quantities that are asked for.
+pub(super) fn degrees(graph: &Graph, of: &dyn Fn(Leaf) -> bool) -> Vec<Degree> {
+    let counts = of;
     let mut degrees: Vec<Degree> = Vec::with_capacity(graph.len());
     for node in graph.nodes() {
         let of = |id: Id| degrees[id.index()];
@@ -22,7 +23,7 @@ pub(super) fn degrees(graph: &Graph) -> Vec<Degree> {
         let constant = |needed: Degree, result: Degree| if needed == Degree::Zero { result } else { Degree::Higher };
         let degree = match *node {
             Node::Constant(_) => Degree::Zero,
-            Node::Leaf(Leaf::State(_)) => Degree::One,
+            Node::Leaf(leaf) if counts(leaf) => Degree::One,
             Node::Leaf(_) => Degree::Zero,
             Node::Neg(a) => of(a),
             Node::Add(a, b) | Node::Sub(a, b) => of(a).max(of(b)),

@@ -5,7 +5,7 @@ use crate::error::Error;
 use crate::estimate::{Estimate, Summary};
 use crate::experiment::ExperimentOf;
 use crate::functions::Handle;
-use crate::integrate::{Automatic, Integrator, Method, Rk4, Stiff, automatic, stiff};
+use crate::integrate::{Automatic, Integrator, Method, Rk4, Stiff, automatic, exact, stiff};
 use crate::layout::{Kind, Layout};
 use crate::model::Model;
 use crate::parameter::Parameter;
@@ -70,6 +70,8 @@ pub trait Made: Fittable {
     fn per_input(numbers: Self::PerInput) -> Vec<f64>;
     fn estimate(summary: Summary) -> Result<Self::Estimate, Error>;
     fn stepping(integrator: impl Integrator) -> Self::Stepping;
+    /// The transition of equations that are linear with constant coefficients.
+    fn exact(&self) -> Option<Self::Stepping>;
     /// The methods that follow the default one, of what is continuous.
     fn finer(&self) -> Vec<Self::Stepping>;
     /// A sweep, by the default integrator and of the simulation error unless said otherwise.
@@ -80,6 +82,18 @@ pub trait Made: Fittable {
     ) -> Result<Arc<dyn Sweep + 'a>, Error>
     where
         Self: 'a;
+}
+
+/// The integrator that was chosen; else, for a Kalman filter of linear equations, their transition, where samples are evenly spaced. `None`: the
+/// default one.
+pub(super) fn stepping<M: Made>(
+    model: &M,
+    chosen: Option<&M::Stepping>,
+    predictor: Option<&Predicting>,
+    evenly: bool,
+) -> Option<M::Stepping> {
+    let is_filter = predictor.is_some_and(|Predicting(predictor)| predictor.second_order().is_some());
+    chosen.cloned().or_else(|| (is_filter && evenly).then(|| model.exact()).flatten())
 }
 
 /// The sweeps by the methods that follow a default one that is too coarse.
@@ -174,6 +188,11 @@ impl<M: Model> Made for M {
         Stepping { loops: Arc::new(integrator.clone()), method: Arc::new(integrator) }
     }
 
+    fn exact(&self) -> Option<Stepping<M>> {
+        Equations::trace(self).ok()?.linear()?;
+        Some(Stepping { method: exact(), ..Stepping::automatic(1) })
+    }
+
     fn finer(&self) -> Vec<Stepping<M>> {
         if M::KIND != Kind::Continuous {
             return vec![];
@@ -239,6 +258,10 @@ impl Made for Equations {
         AnyStepping(Arc::new(integrator))
     }
 
+    fn exact(&self) -> Option<AnyStepping> {
+        self.linear().map(|_| AnyStepping(exact()))
+    }
+
     fn finer(&self) -> Vec<AnyStepping> {
         match self.layout().kind {
             Kind::Continuous => SUBSTEPS.map(automatic).into_iter().chain([stiff()]).map(AnyStepping).collect(),
@@ -293,6 +316,10 @@ impl Made for Arc<dyn Sweep + '_> {
 
     fn stepping(integrator: impl Integrator) -> AnyStepping {
         AnyStepping(Arc::new(integrator))
+    }
+
+    fn exact(&self) -> Option<AnyStepping> {
+        None
     }
 
     fn finer(&self) -> Vec<AnyStepping> {

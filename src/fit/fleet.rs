@@ -1,6 +1,6 @@
 //! [`Fleet`]: the same fit of many records, each by itself.
 
-use super::fittable::{Made, finer};
+use super::fittable::{Made, finer, stepping};
 use super::lockstep::fit_together;
 #[cfg(feature = "parallel")]
 use super::prefetch::in_order;
@@ -47,9 +47,10 @@ impl<'a, M: Made> Fit<'a, M> {
     /// An integrator or a predictor that does not support the model; settings that only a single fit can have (a
     /// checkpoint, observers).
     pub fn fleet(self) -> Result<Fleet<'a, M>, Error> {
-        let (model, stepping, predictor) = (self.model.lent(), self.stepping.as_ref(), self.predictor.as_ref());
-        let sweep = M::sweep(model.clone(), stepping, predictor)?;
-        let finer = finer(model, stepping, predictor);
+        let (model, predictor) = (self.model.lent(), self.predictor.as_ref());
+        let stepping = stepping(&*model, self.stepping.as_ref(), predictor, true);
+        let sweep = M::sweep(model.clone(), stepping.as_ref(), predictor)?;
+        let finer = finer(model, stepping.as_ref(), predictor);
         let fits = Fits { sweep, finer, parameters: self.parameters, settings: self.settings };
         Ok(Fleet { fits: fits.checked()?, model: PhantomData })
     }

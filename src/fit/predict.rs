@@ -1,7 +1,7 @@
 //! Prediction of a record by an estimate, and its states: a fit of the initial state alone.
 
 use super::Fit;
-use super::fittable::{Made, finer};
+use super::fittable::{Made, finer, stepping};
 use super::search::search;
 use crate::error::Error;
 use crate::estimate::{Estimate, Prediction, StatesOf, Summary};
@@ -85,9 +85,10 @@ impl<M: Model> Fit<'_, M> {
 
     /// The sweep of this fit, by the method of the estimate, where the fit would have come to it by itself.
     fn sweep_of(&self, estimate: &Estimate<M>) -> Result<Arc<dyn Sweep + '_>, Error> {
-        let (stepping, predictor) = (self.stepping.as_ref(), self.predictor.as_ref());
-        let sweep = M::sweep(self.model.lent(), stepping, predictor)?;
-        let finer = finer(self.model.lent(), stepping, predictor);
+        let predictor = self.predictor.as_ref();
+        let stepping = stepping(self.model, self.stepping.as_ref(), predictor, true);
+        let sweep = M::sweep(self.model.lent(), stepping.as_ref(), predictor)?;
+        let finer = finer(self.model.lent(), stepping.as_ref(), predictor);
         Ok(finer.by_number(estimate.method.refinement).unwrap_or(sweep))
     }
 }

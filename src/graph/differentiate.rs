@@ -39,6 +39,30 @@ pub enum Seed {
     Parameter(usize),
 }
 
+/// A number that follows from parameters and the time between two samples, computed before a pass. It stands after the parameters, and after it
+/// stand its slopes.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Following {
+    /// Its number as a [`Leaf::Parameter`].
+    pub number: u32,
+    /// The parameters that it has slopes with respect to.
+    pub moves: Vec<u32>,
+}
+
+impl Following {
+    /// The leaf of its slope.
+    fn slope(&self, seed: &Seed) -> Option<Leaf> {
+        let Seed::Parameter(j) = *seed else { return None };
+        let at = self.moves.iter().position(|moves| *moves as usize == j)?;
+        Some(Leaf::Parameter(self.number + 1 + u32::try_from(at).unwrap_or(u32::MAX)))
+    }
+
+    /// The leaf after its last slope.
+    pub fn end(&self) -> usize {
+        self.number as usize + 1 + self.moves.len()
+    }
+}
+
 /// With more cuts than this, slopes are carried.
 const MAX_CUTS: usize = 64;
 
@@ -51,9 +75,9 @@ pub(crate) struct Variables {
 }
 
 impl Variables {
-    /// The carried entries, whose slopes are leaves themselves where `pattern` says that there are any, and the seeded
-    /// parameters.
-    pub fn new(tape: &mut Tape, seeds: &[Seed], pattern: &Pattern) -> Self {
+    /// The carried entries, whose slopes are leaves themselves where `pattern` says that there are any, the seeded parameters, and what follows from
+    /// these.
+    pub fn new(tape: &mut Tape, seeds: &[Seed], pattern: &Pattern, following: &[Following]) -> Self {
         let (mut leaves, mut tangents) = (vec![], vec![]);
         for (i, row) in pattern.rows.iter().enumerate() {
             if row.iter().any(Option::is_some) {
@@ -66,6 +90,13 @@ impl Variables {
                 leaves.push(tape.leaf(Leaf::Parameter(u32::try_from(*j).unwrap_or(u32::MAX))));
                 let one = tape.constant(1.0);
                 tangents.push((0..seeds.len()).map(|i| (i == s).then_some(one)).collect());
+            }
+        }
+        for one in following {
+            let slopes: Vec<Option<Leaf>> = seeds.iter().map(|seed| one.slope(seed)).collect();
+            if slopes.iter().any(Option::is_some) {
+                leaves.push(tape.leaf(Leaf::Parameter(one.number)));
+                tangents.push(slopes.iter().map(|slope| slope.map(|slope| tape.leaf(slope))).collect());
             }
         }
         Variables { leaves, tangents, seeds: seeds.len() }
@@ -85,7 +116,13 @@ pub(crate) struct Pattern {
 impl Pattern {
     /// All slopes that may arise from unit slopes at the start and from what else each entry `starts` from, by what each next entry
     /// depends on.
-    pub fn new(tape: &mut Tape, next: &[Id], seeds: &[Seed], starts: &dyn Fn(usize, Leaf) -> bool) -> Self {
+    pub fn new(
+        tape: &mut Tape,
+        next: &[Id],
+        seeds: &[Seed],
+        following: &[Following],
+        starts: &dyn Fn(usize, Leaf) -> bool,
+    ) -> Self {
         let n = next.len();
         let leaf = |seed: &Seed| match seed {
             Seed::Carry(i) => state(*i),
@@ -93,8 +130,14 @@ impl Pattern {
         };
         let mut all: Vec<Id> = (0..n).map(|i| tape.leaf(state(i))).collect();
         all.extend(seeds.iter().map(|seed| tape.leaf(leaf(seed))));
+        all.extend(following.iter().map(|one| tape.leaf(Leaf::Parameter(one.number))));
         let influence = forward::influence(tape, &all, next);
-        let parameter = |s: usize| matches!(seeds[s], Seed::Parameter(_));
+        let follows = |i: usize, s: usize| {
+            let mut moving = following.iter().zip(&influence[i][n + seeds.len()..]);
+            moving.any(|(one, reaches)| *reaches && one.slope(&seeds[s]).is_some())
+        };
+        let parameter =
+            |i: usize, s: usize| matches!(seeds[s], Seed::Parameter(_)) && influence[i][n + s] || follows(i, s);
         let mut there: Vec<Vec<bool>> = (0..n)
             .map(|i| seeds.iter().map(|seed| *seed == Seed::Carry(i) || starts(i, leaf(seed))).collect())
             .collect();
@@ -103,8 +146,7 @@ impl Pattern {
             grew = false;
             for i in 0..n {
                 for s in 0..seeds.len() {
-                    let from_parameter = parameter(s) && influence[i][n + s];
-                    let reached = from_parameter || (0..n).any(|j| influence[i][j] && there[j][s]);
+                    let reached = parameter(i, s) || (0..n).any(|j| influence[i][j] && there[j][s]);
                     if reached && !there[i][s] {
                         (there[i][s], grew) = (true, true);
                     }
@@ -168,7 +210,7 @@ mod tests {
             // All slopes may be there; those of the parameters are zero at the start.
             let row = |i: usize| (0..SEEDS).map(|s| Some(2 + i * SEEDS + s)).collect();
             let pattern = Pattern { rows: vec![row(0), row(1)] };
-            let variables = Variables::new(&mut tape, &seeds, &pattern);
+            let variables = Variables::new(&mut tape, &seeds, &pattern, &[]);
             let tangents = slopes(&mut tape, &values, &variables, way);
             for point in POINTS {
                 let value = |leaf| match leaf {

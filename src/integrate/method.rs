@@ -1,5 +1,6 @@
 //! [`Method`]: an integrator whose type is not known, for systems whose number of states is known at run time only.
 
+use super::exact::Exact;
 use super::{Automatic, Integrator, Rk4, Square, Stiff, Stuck, System};
 use crate::dual::Dual;
 use crate::error::Error;
@@ -132,6 +133,14 @@ pub(crate) trait Method: Debug + Send + Sync {
     fn advance_duals(&self, field: &Field<'_, Duals>, x: Vec<Duals>, step: &mut f64) -> Result<Vec<Duals>, Stuck>;
     fn advance_symbols(&self, field: &SymbolicField<'_>, x: Vec<Symbol>) -> Result<Vec<Symbol>, Stuck>;
     fn is_fixed(&self) -> bool;
+    /// Whether linear equations with constant coefficients are to be taken from sample to sample exactly, and not by this method.
+    fn is_exact(&self) -> bool {
+        false
+    }
+    /// The method for equations that are not linear, of one that is exact.
+    fn otherwise(&self) -> Option<Arc<dyn Method>> {
+        None
+    }
     /// This method with a finer step, if there is one.
     fn refined(&self, kind: Kind) -> Option<Arc<dyn Method>>;
     /// Refuses models of a kind that the method does not serve, and settings that make no sense.
@@ -184,6 +193,11 @@ impl<I: Integrator> Method for I {
 #[inline(never)]
 pub(crate) fn automatic(substeps: u32) -> Arc<dyn Method> {
     Arc::new(Automatic { continuous: Rk4 { substeps } })
+}
+
+/// The default method of filters of linear equations with constant coefficients.
+pub(crate) fn exact() -> Arc<dyn Method> {
+    Arc::new(Exact)
 }
 
 /// The last of the default methods.

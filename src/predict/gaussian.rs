@@ -92,6 +92,9 @@ fn advance<O: Order, S: Scalar>(plant: &dyn Plant<S>, carry: &mut [S]) -> Result
     if n == 0 {
         return Ok(());
     }
+    if plant.spread(&mut carry[n..]) {
+        return plant.next(&mut carry[..n]);
+    }
     // dx/dt = E f, dP/dt = A P + P A' + Q with A = E df/dx: the covariance of x and f(x) is P A' where x is Gaussian (C. Stein).
     plant.integrate(carry, &|position, z, to| {
         let Moments { mean, slopes: a, .. } = O::state(plant, position, z);

@@ -8,7 +8,9 @@ use crate::interval::Hold;
 use crate::layout::{Kind, Layout};
 use crate::record::{Part, Record};
 use crate::scalar::Scalar;
-use core::cell::Cell;
+use crate::transition::{Crossing, Transition};
+use core::cell::{Cell, RefCell};
+use std::rc::Rc;
 
 /// The model at one sample and in the interval to the next, with given parameters and inputs.
 pub trait Plant<S> {
@@ -54,6 +56,13 @@ pub trait Plant<S> {
     /// # Errors
     /// Where the integrator is [`Stuck`].
     fn integrate(&self, z: &mut [S], rate: Rate<'_, S>) -> Result<(), Stuck>;
+
+    /// Of a plant whose equations are linear, where the fit takes them from sample to sample exactly: replaces the covariance of the state at this
+    /// sample, upper triangle row by row, by that at the next. False of others, whose covariance is to be [integrated](Plant::integrate).
+    fn spread(&self, covariance: &mut [S]) -> bool {
+        let _ = covariance;
+        false
+    }
 
     /// Process noise of each state at the fraction `position` of the interval, as [`Model::diffusion`](crate::Model::diffusion).
     fn diffusion(&self, position: f64, x: &[S], to: &mut [S]);
@@ -136,9 +145,25 @@ pub(crate) struct SlicePlant<'a, S> {
     pub method: &'a dyn Method,
     pub between: Between<S>,
     pub p: &'a [S],
-    /// The step that an adaptive integrator passes from interval to interval.
-    pub step: &'a Cell<f64>,
+    pub intervals: &'a Intervals<S>,
 }
+
+/// What is kept from interval to interval.
+pub(crate) struct Intervals<S> {
+    /// The step of an adaptive integrator.
+    pub step: Cell<f64>,
+    /// Of linear equations that are crossed exactly, by the length of the interval (s).
+    crossings: RefCell<Vec<(f64, Rc<Crossing<S>>)>>,
+}
+
+impl<S> Default for Intervals<S> {
+    fn default() -> Self {
+        Intervals { step: Cell::new(0.0), crossings: RefCell::default() }
+    }
+}
+
+/// Lengths of intervals whose transitions are kept.
+const LENGTHS: usize = 16;
 
 /// Numbers that a [`Method`] can integrate.
 pub(crate) trait Stepped: Scalar {
@@ -163,13 +188,34 @@ impl Stepped for Duals {
 }
 
 impl<S: Stepped> SlicePlant<'_, S> {
+    /// The transition of linear equations, where the method is exact.
+    fn crossing(&self) -> Option<Rc<Crossing<S>>> {
+        if !self.method.is_exact() {
+            return None;
+        }
+        let (n, length) = (self.layout.states.len(), self.between.length());
+        if let Some((_, known)) = self.intervals.crossings.borrow().iter().find(|(known, _)| *known == length) {
+            return Some(known.clone());
+        }
+        let none = vec![S::from(0.0); n];
+        let (mut a, mut q, mut levels) = (vec![S::from(0.0); n * n], vec![S::from(0.0); n * n], none.clone());
+        self.state_slopes(0.0, &none, &mut a);
+        self.diffusion(0.0, &none, &mut levels);
+        q.iter_mut().step_by(n + 1).zip(levels).for_each(|(q, level)| *q = level * level);
+        let made = Rc::new(Transition::over(n, &a, &q, S::from(length)).crossing());
+        let mut kept = self.intervals.crossings.borrow_mut();
+        kept.truncate(LENGTHS - 1);
+        kept.insert(0, (length, made.clone()));
+        Some(made)
+    }
+
     fn cross(&self, kind: Kind, z: &mut [S], rate: Rate<'_, S>, slopes: Slopes<'_>) -> Result<(), Stuck> {
         let Between { interval, parts, part, .. } = &self.between;
         if parts.is_empty() || kind == Kind::Discrete {
             let field = Field { kind, interval: *interval, states: z.len(), rate, slopes };
-            let mut step = self.step.get();
+            let mut step = self.intervals.step.get();
             z.copy_from_slice(&S::advance(self.method, &field, z.to_vec(), &mut step)?);
-            self.step.set(step);
+            self.intervals.step.set(step);
             return Ok(());
         }
         for (i, here) in parts.iter().enumerate() {
@@ -187,12 +233,12 @@ impl<S: Stepped> SlicePlant<'_, S> {
             };
             let field = Field { kind, interval: (0.0, 1.0), states, rate: &rate, slopes: &slopes };
             let long = length.value() > 0.0;
-            let mut step = if long { self.step.get() / length.value() } else { 0.0 };
+            let mut step = if long { self.intervals.step.get() / length.value() } else { 0.0 };
             let end = S::advance(self.method, &field, z.to_vec(), &mut step);
             part.set(None);
             z.copy_from_slice(&end?);
             if long {
-                self.step.set(step * length.value());
+                self.intervals.step.set(step * length.value());
             }
         }
         Ok(())
@@ -214,6 +260,16 @@ impl<S: Stepped> Plant<S> for SlicePlant<'_, S> {
 
     fn next(&self, x: &mut [S]) -> Result<(), Stuck> {
         let (state, _) = x.split_at_mut(self.layout.states.len());
+        if let Some(crossing) = self.crossing() {
+            let at = |position: f64| {
+                let mut rate = state.to_vec();
+                self.derivative(position, state, &mut rate);
+                rate
+            };
+            let end = self.between.u1.is_some().then(|| at(1.0));
+            crossing.state(state, &at(0.0), end.as_deref());
+            return Ok(());
+        }
         let p: Vec<Duals> = self.p.iter().map(|p| Dual::constant(p.value())).collect();
         let slopes = |position: f64, x: &[f64]| {
             let t = Dual::constant(self.between.time(position).value());
@@ -272,6 +328,10 @@ impl<S: Stepped> Plant<S> for SlicePlant<'_, S> {
             (values(position, z), rows)
         };
         self.cross(Kind::Continuous, z, rate, &slopes)
+    }
+
+    fn spread(&self, covariance: &mut [S]) -> bool {
+        self.crossing().map(|crossing| crossing.spread(covariance)).is_some()
     }
 
     fn diffusion(&self, position: f64, x: &[S], to: &mut [S]) {

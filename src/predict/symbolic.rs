@@ -58,7 +58,9 @@ pub(crate) fn recurrence(
     let (mean, variance) = rest.split_at(outputs.min(rest.len()));
     let made = Recurrence::from_roots(&graph, next, mean, variance);
     let made = made.map_err(|wrong| Untraceable { reason: wrong.to_string() })?;
-    Ok(made.started(started(equations, slopes.as_ref(), predictor)))
+    let linear = method.is_exact().then(|| equations.linear()).flatten();
+    let following = linear.map_or(vec![], |linear| linear.following());
+    Ok(made.started(started(equations, slopes.as_ref(), predictor)).with_following(following))
 }
 
 /// The states and parameters on which the start depends.
@@ -170,6 +172,10 @@ impl Plant<Symbol> for SymbolicPlant<'_> {
     fn integrate(&self, z: &mut [Symbol], rate: &dyn Fn(f64, &[Symbol], &mut [Symbol])) -> Result<(), Stuck> {
         self.interval.cross(Kind::Continuous, z, rate);
         Ok(())
+    }
+
+    fn spread(&self, covariance: &mut [Symbol]) -> bool {
+        self.interval.crossing().map(|crossing| crossing.spread(covariance)).is_some()
     }
 
     fn diffusion(&self, position: f64, x: &[Symbol], to: &mut [Symbol]) {

@@ -7,6 +7,7 @@ use crate::integrate::{Method, Rate, SymbolicField};
 use crate::interval::Hold;
 use crate::layout::Kind;
 use crate::record::Holds;
+use crate::transition::Crossing;
 use core::cell::{Cell, OnceCell};
 
 /// The equations from one sample to the next: what is computed with it belongs to one trace.
@@ -17,13 +18,22 @@ pub(crate) struct SymbolicInterval<'a> {
     holds: &'a Holds,
     /// Made in the trace.
     late: OnceCell<LateInputs>,
+    /// Of a method that is exact; made in the trace.
+    crossing: OnceCell<Option<Crossing<Symbol>>>,
     /// The part between two cuts that is being crossed.
     part: Cell<Option<Part>>,
 }
 
 impl<'a> SymbolicInterval<'a> {
     pub fn new(equations: &'a Equations, method: &'a dyn Method, holds: &'a Holds) -> Self {
-        SymbolicInterval { equations, method, holds, late: OnceCell::new(), part: Cell::new(None) }
+        SymbolicInterval {
+            equations,
+            method,
+            holds,
+            late: OnceCell::new(),
+            crossing: OnceCell::new(),
+            part: Cell::new(None),
+        }
     }
 
     pub fn equations(&self) -> &'a Equations {
@@ -84,8 +94,26 @@ impl<'a> SymbolicInterval<'a> {
         self.at(self.equations.graph(), &self.equations.roots().output, 0.0, x)
     }
 
+    /// The transition of linear equations, where the method is exact: numbers that follow from parameters.
+    pub fn crossing(&self) -> Option<&Crossing<Symbol>> {
+        let made = || {
+            let linear = self.method.is_exact().then(|| self.equations.linear()).flatten()?;
+            Some(linear.crossing(|following| Symbol::leaf(Leaf::Parameter(following.number))))
+        };
+        self.crossing.get_or_init(made).as_ref()
+    }
+
     /// The state at the next sample.
     pub fn next(&self, x: &mut [Symbol]) {
+        if let Some(crossing) = self.crossing() {
+            let at = |position: f64| {
+                let mut rate = x.to_vec();
+                self.rate(position, x, &mut rate);
+                rate
+            };
+            let end = (!self.holds.all_zero()).then(|| at(1.0));
+            return crossing.state(x, &at(0.0), end.as_deref());
+        }
         let kind = self.equations.layout().kind;
         self.cross(kind, x, &|position, x, to| self.rate(position, x, to));
     }

@@ -121,7 +121,8 @@ impl Sweep for DualSweep<'_> {
         let one = |piece: &Piece<'_>| {
             let restart = self.predictor.restarts().map(|horizon| horizon.steps);
             let filter = self.filter(piece.parameters);
-            match (restart.is_some() || self.predictor.is_simulation()) && !filter.late.contains(&true) {
+            let is_simulated = restart.is_some() || self.predictor.is_simulation();
+            match is_simulated && !filter.late.contains(&true) && !self.method.is_exact() {
                 true => self.code.run(&filter, piece, seeds, restart, visit),
                 false => filter.run(piece, seeds, restart, visit),
             }
@@ -207,7 +208,8 @@ impl Sweep for DualSweep<'_> {
     fn with_terms<'s>(&'s self) -> Option<Lacking<'s>> {
         let WithTerms { equations, terms, left_out } = self.code.equations()?.with_terms();
         let (layout, code) = (Arc::new(equations.layout().clone()), Arc::new(Evaluated::new(Arc::new(equations))));
-        let (method, predictor) = (self.method.clone(), self.predictor.clone());
+        let method = self.method.otherwise().unwrap_or_else(|| self.method.clone());
+        let predictor = self.predictor.clone();
         let sweep = DualSweep { layout, code, method, predictor, uncompiled: self.uncompiled.clone() };
         Some(Lacking { sweep: Arc::new(sweep), terms, left_out })
     }

@@ -4,9 +4,8 @@ use crate::error::Failure;
 use crate::functions::{Functions, delays};
 use crate::integrate::{Duals, Method, Stuck};
 use crate::layout::Layout;
-use crate::predict::{Between, Plant, SlicePlant};
+use crate::predict::{Between, Intervals, Plant, SlicePlant};
 use crate::record::{NO_DEAD_TIME, Record, is_dead_time};
-use core::cell::Cell;
 use core::sync::atomic::{AtomicBool, Ordering};
 
 /// Runs a record in plain numbers to find the cause of a failure.
@@ -56,15 +55,22 @@ impl FailureSearch<'_> {
             return broken(0, signal, delays[i].unwrap_or(f64::NAN), NO_DEAD_TIME);
         }
         let mut x = state.to_vec();
-        let step = Cell::new(0.0);
+        let intervals = Intervals::default();
         let watched = Watched::new(self.values);
         let mut y = vec![0.0; self.layout.outputs.len()];
         let mut largest = (sample, 0, 0.0f64);
         for k in 0..self.record.len() {
             let between = Between::new(self.record, k, &delays);
             let FailureSearch { layout, duals, method, .. } = self;
-            let plant =
-                SlicePlant { layout, functions: &watched, duals: *duals, method: *method, between, p, step: &step };
+            let plant = SlicePlant {
+                layout,
+                functions: &watched,
+                duals: *duals,
+                method: *method,
+                between,
+                p,
+                intervals: &intervals,
+            };
             watched.forget();
             plant.output(&x, &mut y);
             for (j, (&y, channel)) in y.iter().zip(self.record.outputs()).enumerate() {
@@ -169,5 +175,10 @@ impl Functions<f64> for Watched<'_> {
 
     fn delay(&self, p: &[f64], to: &mut [f64]) {
         self.values.delay(p, to);
+    }
+
+    // Not by secants, whose states are large.
+    fn state_slopes(&self, t: f64, x: &[f64], u: &[f64], p: &[f64], to: &mut [f64]) {
+        self.values.state_slopes(t, x, u, p, to);
     }
 }

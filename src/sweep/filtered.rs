@@ -7,10 +7,9 @@ use crate::dual::Dual;
 use crate::functions::{Functions, delays};
 use crate::integrate::{Duals, Method, Stuck};
 use crate::layout::Layout;
-use crate::predict::{Between, Prediction, SlicePlant, Stepped, Steps};
+use crate::predict::{Between, Intervals, Prediction, SlicePlant, Stepped, Steps};
 use crate::record::{Initial, Record};
 use crate::scalar::Scalar;
-use core::cell::Cell;
 
 /// Samples per window.
 const WINDOW: usize = 128;
@@ -48,7 +47,7 @@ struct Pass<S> {
     p: Vec<S>,
     /// Dead times of the inputs, where there are any.
     delays: Vec<Option<S>>,
-    step: Cell<f64>,
+    intervals: Intervals<S>,
     first: usize,
     used: usize,
 }
@@ -117,7 +116,7 @@ impl Filter<'_> {
                 carry[i] = Dual::variable(*x, lane(i));
             }
             let p: Vec<Duals> = parameters.iter().enumerate().map(|(j, p)| Dual::variable(*p, lane(n + j))).collect();
-            let step = Cell::new(0.0);
+            let intervals = Intervals::default();
             let delays = delays(self.duals, &self.late, &p);
             match &rest {
                 Some(rest) => carry[..n].copy_from_slice(&rest.state(self, record, &delays, &p)),
@@ -129,7 +128,7 @@ impl Filter<'_> {
                 }
                 None => {}
             }
-            let plant = self.plant(self.duals, Between::new(record, sample, &delays), &p, &step);
+            let plant = self.plant(self.duals, Between::new(record, sample, &delays), &p, &intervals);
             self.predictor.duals().start(&plant, &mut carry)?;
             for (entry, x) in carry.iter().enumerate() {
                 reached.carry[entry] = x.value;
@@ -161,9 +160,9 @@ impl Filter<'_> {
         functions: &'p dyn Functions<S>,
         between: Between<S>,
         p: &'p [S],
-        step: &'p Cell<f64>,
+        intervals: &'p Intervals<S>,
     ) -> SlicePlant<'p, S> {
-        SlicePlant { layout: self.layout, functions, duals: self.duals, method: self.method, between, p, step }
+        SlicePlant { layout: self.layout, functions, duals: self.duals, method: self.method, between, p, intervals }
     }
 
     fn run_windows<S: Number>(
@@ -231,7 +230,7 @@ impl Filter<'_> {
             None => true,
             Some(restart) => self.restart(task, pass, sample, restart).map_err(|Stuck| RunError::Failed { sample })?,
         };
-        let plant = self.plant(functions, Between::new(piece.record, sample, &pass.delays), &pass.p, &pass.step);
+        let plant = self.plant(functions, Between::new(piece.record, sample, &pass.delays), &pass.p, &pass.intervals);
         let columns = window.columns();
         for (j, channel) in piece.record.outputs().iter().enumerate() {
             let y = if is_known { channel.values[sample] } else { f64::NAN };
@@ -280,9 +279,10 @@ impl Filter<'_> {
             }
             pass.carry.iter_mut().zip(measured).for_each(|(x, measured)| *x = S::from(*measured));
         }
-        pass.step.set(0.0);
+        pass.intervals.step.set(0.0);
         for from in first..sample {
-            let plant = self.plant(task.functions, Between::new(piece.record, from, &pass.delays), &pass.p, &pass.step);
+            let plant =
+                self.plant(task.functions, Between::new(piece.record, from, &pass.delays), &pass.p, &pass.intervals);
             task.steps.advance(&plant, &mut pass.carry)?;
         }
         Ok(true)
@@ -300,6 +300,6 @@ impl<S: Number> Pass<S> {
             piece.carry.iter().enumerate().map(|(entry, x)| S::with(*x, &|i| slope(entry, i))).collect();
         let parameters = piece.parameters.iter().enumerate();
         let p = parameters.map(|(j, p)| S::with(*p, &|i| f64::from(u8::from(moves(j, i))))).collect();
-        Pass { start: carry.clone(), carry, p, delays: vec![], step: Cell::new(0.0), first, used }
+        Pass { start: carry.clone(), carry, p, delays: vec![], intervals: Intervals::default(), first, used }
     }
 }

@@ -1,6 +1,7 @@
 //! [`ProgramSweep`]: traced models, run as compiled programs, pieces in parallel lanes.
 
 mod columns;
+mod crossed;
 mod derived;
 mod horizon;
 mod interleaved;
@@ -20,6 +21,7 @@ use crate::layout::{Kind, Layout};
 use crate::predict::{FreeRun, GivenNoise, Guess, Prediction, recurrence};
 use crate::record::{Holds, Initial, Record, Time};
 use crate::recurrence::Recurrence;
+use crossed::Crossed;
 pub(crate) use derived::Derived;
 pub(crate) use interleaved::Interleaved;
 use late::Late;
@@ -55,6 +57,7 @@ type MaybeCompiled = Result<Arc<Compiled>, String>;
 
 /// Why a record has no program.
 const UNEVEN: &str = "inputs have dead times and samples are not evenly spaced";
+const UNEVENLY_CROSSED: &str = "intervals are crossed exactly and samples are not evenly spaced";
 
 /// Number of samples that take as long in dual numbers as a program takes to be compiled.
 const WORTH_COMPILING: usize = 4_000;
@@ -151,15 +154,19 @@ impl Programs {
             false => recurrence,
         };
         let is_late = self.equations.late().contains(&true);
+        let linear = self.method.is_exact().then(|| self.equations.linear()).flatten();
         let program = match purpose {
             // How often a dead time cuts an interval differs from one to the next.
             _ if is_late && sampling == Sampling::Irregular => Err(UNEVEN.to_owned()),
+            // What follows from the parameters is computed for one interval.
+            _ if linear.is_some() && sampling == Sampling::Irregular => Err(UNEVENLY_CROSSED.to_owned()),
             Purpose::Rows => Ok(Program::compile(&recurrence, seeds, sampling, Trajectories::Many)),
             Purpose::Carry => Ok(Program::compile(&recurrence.without_outputs(), &[], sampling, Trajectories::One)),
         };
         let program = program.and_then(|program| program.map_err(|too_large| too_large.to_string()));
         let late = is_late.then(|| Late::new(self.equations.clone()));
-        let program = program.map(|program| Arc::new(Compiled::new(program, late)));
+        let crossed = linear.map(Crossed::new);
+        let program = program.map(|program| Arc::new(Compiled::new(program, late, crossed)));
         compiled.push((key, program.clone()));
         program.ok()
     }
@@ -291,14 +298,16 @@ impl Sweep for ProgramSweep<'_> {
 
     fn filtering<'s>(&'s self, noise: &GivenNoise) -> Option<Arc<dyn Sweep + 's>> {
         let predictor: Arc<dyn Prediction> = Arc::new(noise.clone());
-        let sweep: Arc<dyn Sweep> = of_equations(&self.programs.equations, &self.programs.method, &predictor).ok()?;
+        let method = self.programs.method.otherwise().unwrap_or_else(|| self.programs.method.clone());
+        let sweep: Arc<dyn Sweep> = of_equations(&self.programs.equations, &method, &predictor).ok()?;
         Some(sweep)
     }
 
     fn with_terms<'s>(&'s self) -> Option<Lacking<'s>> {
         let make = || {
             let WithTerms { equations, terms, left_out } = self.programs.equations.with_terms();
-            let sweep = of_equations(&Arc::new(equations), &self.programs.method, &self.programs.predictor).ok()?;
+            let method = self.programs.method.otherwise().unwrap_or_else(|| self.programs.method.clone());
+            let sweep = of_equations(&Arc::new(equations), &method, &self.programs.predictor).ok()?;
             Some(Lacking { sweep, terms, left_out })
         };
         self.programs.lacking.get_or_init(make).clone()

@@ -6,9 +6,8 @@ use crate::functions::delays;
 use crate::integrate::{Duals, Stuck};
 use crate::layout::Layout;
 use crate::moments::entry;
-use crate::predict::{Between, Plant};
+use crate::predict::{Between, Intervals, Plant};
 use crate::record::Record;
-use core::cell::Cell;
 
 /// The states of a record with their covariance, by the parameters and the initial state of an estimate, whose own uncertainty is not in it.
 #[derive(Clone, Debug, PartialEq)]
@@ -59,13 +58,14 @@ impl Filter<'_> {
 
     fn visited(&self, record: &Record, carry: &[f64], p: &[f64], smoothed: bool) -> Result<Vec<Visited>, usize> {
         let (n, outputs) = (self.layout.states.len(), self.layout.outputs.len());
-        let (steps, late, step) = (self.predictor.values(), delays(self.values, &self.late, p), Cell::new(0.0));
+        let (steps, late, intervals) =
+            (self.predictor.values(), delays(self.values, &self.late, p), Intervals::default());
         let constant: Vec<Duals> = p.iter().map(|p| Dual::constant(*p)).collect();
-        let steps_of_slopes = vec![Cell::new(0.0); n.div_ceil(SLOPES)];
+        let of_slopes: Vec<Intervals<Duals>> = (0..n.div_ceil(SLOPES)).map(|_| Intervals::default()).collect();
         let mut carry = carry.to_vec();
         let mut visited = Vec::with_capacity(record.len());
         for k in 0..record.len() {
-            let plant = self.plant(self.values, Between::new(record, k, &late), p, &step);
+            let plant = self.plant(self.values, Between::new(record, k, &late), p, &intervals);
             let mut updates = vec![];
             for (j, channel) in record.outputs().iter().enumerate().filter(|(_, channel)| !channel.values[k].is_nan()) {
                 let (mean, variance) = steps.predict(&plant, &carry, j);
@@ -83,7 +83,7 @@ impl Filter<'_> {
             }
             let (after, last) = (carry.clone(), k + 1 == record.len());
             let slopes = match smoothed && !last {
-                true => self.slopes(record, k, &carry, &constant, &steps_of_slopes).map_err(|Stuck| k + 1)?,
+                true => self.slopes(record, k, &carry, &constant, &of_slopes).map_err(|Stuck| k + 1)?,
                 false => vec![],
             };
             visited.push(Visited { updates, carry: after, slopes });
@@ -101,18 +101,18 @@ impl Filter<'_> {
         k: usize,
         carry: &[f64],
         p: &[Duals],
-        steps: &[Cell<f64>],
+        all_intervals: &[Intervals<Duals>],
     ) -> Result<Vec<f64>, Stuck> {
         let n = self.layout.states.len();
         let late = delays(self.duals, &self.late, p);
         let mut slopes = vec![0.0; n * n];
-        for (step, first) in steps.iter().zip((0..n).step_by(SLOPES)) {
+        for (intervals, first) in all_intervals.iter().zip((0..n).step_by(SLOPES)) {
             let seeded = |(i, x): (usize, &f64)| match i < n {
                 true => Dual::variable(*x, i.wrapping_sub(first)),
                 false => Dual::constant(*x),
             };
             let mut next: Vec<Duals> = carry.iter().enumerate().map(seeded).collect();
-            let plant = self.plant(self.duals, Between::new(record, k, &late), p, step);
+            let plant = self.plant(self.duals, Between::new(record, k, &late), p, intervals);
             self.predictor.duals().advance(&plant, &mut next)?;
             for (i, x) in next[..n].iter().enumerate() {
                 slopes[i * n..][..n].iter_mut().skip(first).zip(x.slopes).for_each(|(to, slope)| *to = slope);

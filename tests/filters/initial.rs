@@ -105,6 +105,20 @@ fn likelihoods_of_a_discrete_plant() {
     from_each::<true>(&Time::Uniform { start: 0.0, step: STEP }, 1200, at_rest_in_steps);
 }
 
+/// By default, evenly spaced samples of linear equations are crossed exactly, at a fifth and at twice the shortest time constant, in
+/// segments and without: what is left is the rounding of sums of a thousand terms.
+#[test]
+fn likelihoods_by_exact_transitions() {
+    for (step, samples) in [(0.1, 60), (0.1, 1200), (0.9, 60)] {
+        let record = record::<false>(Time::Uniform { start: 0.0, step }, samples);
+        let fit = || Fit::new(&Heated::<false>, &record).parameters(start());
+        agrees(fit().predictor(Kalman), &record, |plant| plant.p0.clone(), 1e-11);
+        agrees(fit().predictor(Kalman::starting(InitialCovariance::Stationary)), &record, at_rest, 1e-11);
+        let first = |plant: &Plant<D>| plant.over(step).noise;
+        agrees(fit().predictor(Kalman::starting(InitialCovariance::FirstInterval)), &record, first, 1e-11);
+    }
+}
+
 /// Several measurements at the first instant have one interval, which is that from the last of them.
 #[test]
 fn the_first_interval_is_longer_than_zero() {

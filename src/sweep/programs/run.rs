@@ -26,9 +26,10 @@ impl<'r> Run<'r> {
         // Lanes without a piece repeat the first.
         let piece = |lane: usize| pieces.get(lane).unwrap_or(&pieces[0]);
         for lane in 0..lanes {
-            match &compiled.late {
-                Some(late) => group.set_parameters(lane, &late.parameters(piece(lane))),
-                None => group.set_parameters(lane, piece(lane).parameters),
+            match (&compiled.late, &compiled.crossed) {
+                (Some(late), _) => group.set_parameters(lane, &late.parameters(piece(lane))),
+                (_, Some(crossed)) => group.set_parameters(lane, &crossed.parameters(piece(lane))),
+                _ => group.set_parameters(lane, piece(lane).parameters),
             }
             if let Time::Uniform { step, .. } = piece(lane).record.times() {
                 group.set_step(lane, *step);

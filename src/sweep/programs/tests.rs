@@ -3,7 +3,7 @@ mod late;
 use super::*;
 use crate::functions::Handle;
 use crate::graph::choices;
-use crate::integrate::{Rk4, automatic};
+use crate::integrate::{Method, Rk4, automatic, exact};
 use crate::model::Model;
 use crate::predict::{FreeRun, Horizon, InitialCovariance, Kalman, Predictor};
 use crate::record::{Channel, Column};
@@ -18,9 +18,12 @@ signals! {
     struct Given { g: "1/s^2", d: "1/s", b: "1/kg", q: "1", r: "1" }
 }
 
-/// A pendulum, or its linear relative.
-struct Pendulum {
-    linear: bool,
+/// A pendulum that something moves, its linear relative, or that one with constant coefficients.
+#[derive(Clone, Copy, PartialEq)]
+enum Pendulum {
+    Plain,
+    Linear,
+    Constant,
 }
 
 impl Model for Pendulum {
@@ -29,8 +32,9 @@ impl Model for Pendulum {
     type Output = Angle;
     type Parameters = Given;
     fn derivative<S: Scalar>(&self, t: S, x: &Angle<S>, u: &Torque<S>, p: &Given<S>) -> Angle<S> {
-        let pull = if self.linear { x.phi } else { x.phi.sin() };
-        Angle { phi: x.w, w: u.m * p.b - pull * p.g - x.w * p.d + (t * 3.0).sin() * 0.1 }
+        let pull = if *self == Pendulum::Plain { x.phi.sin() } else { x.phi };
+        let moved = if *self == Pendulum::Constant { S::from(0.1) } else { (t * 3.0).sin() * 0.1 };
+        Angle { phi: x.w, w: u.m * p.b - pull * p.g - x.w * p.d + moved }
     }
     fn output<S: Scalar>(&self, _t: S, x: &Angle<S>, u: &Torque<S>, _p: &Given<S>) -> Angle<S> {
         Angle { phi: x.phi, w: x.w + u.m * 0.01 }
@@ -89,8 +93,8 @@ fn rows(sweep: &dyn Sweep, pieces: &[Piece<'_>], seeds: &[Seed]) -> (Vec<Vec<f64
 }
 
 /// The model's own code in duals (its equations, where slopes are asked for that it does not have), its equations in duals, and programs.
-fn sweeps<M: Model>(model: &M, predictor: impl Predictor) -> [Arc<dyn Sweep + '_>; 3] {
-    let (method, predictor): (_, Arc<dyn Prediction>) = (automatic(1), Arc::new(predictor));
+fn sweeps<M: Model>(model: &M, predictor: impl Predictor, method: Arc<dyn Method>) -> [Arc<dyn Sweep + '_>; 3] {
+    let predictor: Arc<dyn Prediction> = Arc::new(predictor);
     let equations = Arc::new(Equations::trace(model).unwrap());
     let duals = |code| -> Arc<dyn Sweep + '_> {
         let (layout, method, predictor) = (Arc::new(Layout::of::<M>()), method.clone(), predictor.clone());
@@ -109,7 +113,8 @@ fn sweeps<M: Model>(model: &M, predictor: impl Predictor) -> [Arc<dyn Sweep + '_
 /// Pieces of several records with different parameters, with slopes and without; the longest has windows after the first of every engine,
 /// in which other samples are missing.
 fn compare(model: &Pendulum, predictor: impl Predictor, uniform: bool, hold: Hold) {
-    let [plain, evaluated, programs] = sweeps(model, predictor);
+    let method = if *model == Pendulum::Constant { exact() } else { automatic(1) };
+    let [plain, evaluated, programs] = sweeps(model, predictor, method);
     let lengths = [300, 64, 2, 33, 197];
     let parameters = |i: usize| [2.0 + 0.1 * i as f64, 0.3, 1.5, 0.2, 0.1];
     let records: Vec<Record> = lengths.iter().map(|&n| record(n.max(40), n as f64, uniform).hold(hold)).collect();
@@ -166,16 +171,43 @@ fn compare(model: &Pendulum, predictor: impl Predictor, uniform: bool, hold: Hol
 fn programs_predict_what_duals_predict() {
     for hold in [Hold::Zero, Hold::First] {
         for uniform in [true, false] {
-            compare(&Pendulum { linear: false }, FreeRun, uniform, hold);
-            compare(&Pendulum { linear: true }, Kalman, uniform, hold);
-            compare(&Pendulum { linear: false }, Kalman, uniform, hold);
+            compare(&Pendulum::Plain, FreeRun, uniform, hold);
+            compare(&Pendulum::Linear, Kalman, uniform, hold);
+            compare(&Pendulum::Constant, FreeRun, uniform, hold);
+            compare(&Pendulum::Constant, Kalman, uniform, hold);
+            compare(&Pendulum::Plain, Kalman, uniform, hold);
             for initial in [InitialCovariance::Stationary, InitialCovariance::FirstInterval] {
-                compare(&Pendulum { linear: true }, Kalman::starting(initial), uniform, hold);
-                compare(&Pendulum { linear: false }, Kalman::starting(initial), uniform, hold);
+                compare(&Pendulum::Linear, Kalman::starting(initial), uniform, hold);
+                compare(&Pendulum::Plain, Kalman::starting(initial), uniform, hold);
             }
         }
-        compare(&Pendulum { linear: false }, Horizon::new(1), true, hold);
-        compare(&Pendulum { linear: false }, Horizon::new(35), true, hold);
+        compare(&Pendulum::Plain, Horizon::new(1), true, hold);
+        compare(&Pendulum::Plain, Horizon::new(35), true, hold);
+    }
+}
+
+/// The transition of linear equations is what steps of a 64th of the interval come to, by some 1e-13, with inputs that are held and that are
+/// interpolated; slopes too.
+#[test]
+fn exact_transitions_are_what_fine_steps_come_to() {
+    for hold in [Hold::Zero, Hold::First] {
+        let record = record(150, 1.0, true).hold(hold);
+        let p = [2.0, 0.3, 1.5, 0.2, 0.1];
+        let seeds = [Seed::Carry(1), Seed::Parameter(0), Seed::Parameter(2), Seed::Parameter(3), Seed::Parameter(4)];
+        let by = |method: Arc<dyn Method>| {
+            let [.., programs] = sweeps(&Pendulum::Constant, Kalman, method);
+            let prepared = programs.prepare(&record, &p).unwrap();
+            let (carry, slopes) = (vec![0.3, -0.2, 0.0, 0.0, 0.0].into(), vec![0.0; 5 * seeds.len()].into());
+            rows(
+                &*programs,
+                &[Piece { record: &record, prepared: &prepared, samples: 0..150, carry, slopes, parameters: &p }],
+                &seeds,
+            )
+            .0
+        };
+        for (exact, stepped) in by(exact()).concat().into_iter().zip(by(automatic(64)).concat()) {
+            assert!((exact - stepped).abs() < 1e-11, "{hold:?}: {exact} {stepped}");
+        }
     }
 }
 
@@ -199,7 +231,7 @@ impl Model for Cart {
 /// without any memory, whatever ran before.
 #[test]
 fn kept_columns_are_those_of_the_records_at_hand() {
-    let [.., programs] = sweeps(&Cart, FreeRun);
+    let [.., programs] = sweeps(&Cart, FreeRun, automatic(1));
     let first = record(300, 1.0, true);
     let with_other_output = {
         let outputs = record(300, 4.0, true).outputs().to_vec();

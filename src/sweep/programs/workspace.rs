@@ -1,5 +1,6 @@
 //! [`Compiled`]: a program with memory for its runs, which the next run uses again.
 
+use super::crossed::Crossed;
 use super::interleaved::Idle;
 use super::late::Late;
 use crate::aligned::Aligned;
@@ -16,6 +17,8 @@ pub(super) struct Compiled {
     pub program: Program,
     /// Where inputs have dead times.
     pub late: Option<Late>,
+    /// Where linear equations are crossed exactly.
+    pub crossed: Option<Crossed>,
     idle: Mutex<Vec<Workspace>>,
     pub columns: Arc<Idle>,
 }
@@ -35,8 +38,8 @@ pub(super) struct Workspace {
 }
 
 impl Compiled {
-    pub fn new(program: Program, late: Option<Late>) -> Self {
-        Compiled { program, late, idle: Mutex::new(vec![]), columns: Arc::default() }
+    pub fn new(program: Program, late: Option<Late>, crossed: Option<Crossed>) -> Self {
+        Compiled { program, late, crossed, idle: Mutex::new(vec![]), columns: Arc::default() }
     }
 
     /// Memory for a run of so many pieces. Lanes, steps and samples are to be set.

@@ -65,7 +65,7 @@ fn driven(samples: usize, holds: [Hold; 3]) -> Record {
 /// before the record, duals cross an interval by one step and programs by two or three. Their slopes with respect to a cut differ by some 1e-8
 /// for steps of 0.02 (RK4: by the fourth power), in up to 150 intervals.
 fn compare(model: &impl Model, predictor: impl Predictor, holds: [Hold; 3], late: [[f64; 2]; 5]) {
-    let [plain, evaluated, programs] = sweeps(model, predictor);
+    let [plain, evaluated, programs] = sweeps(model, predictor, automatic(1));
     let record = driven(150, holds);
     let all_p = late.map(|[early, late]| [2.0, 1.5, 0.1, early * STEP, late * STEP]);
     for (begin, seeds) in [(0, &SEEDS[..]), (0, &[]), (70, &SEEDS[..])] {
@@ -124,7 +124,7 @@ fn late_inputs_that_are_interpolated() {
 /// A dead time that cannot be gives no number; samples that are not evenly spaced are run in dual numbers, and that is said.
 #[test]
 fn what_programs_refuse() {
-    let [.., programs] = sweeps(&Continuous, FreeRun);
+    let [.., programs] = sweeps(&Continuous, FreeRun, automatic(1));
     let record = driven(40, [Hold::Zero; 3]);
     let prepared = Prepared::default();
     let run = |record: &Record, late: f64| {

@@ -1,0 +1,53 @@
+//! [`Crossing`]: the state and its covariance at the end of an interval.
+
+use crate::moments::entry;
+use crate::scalar::Scalar;
+
+/// An interval of linear equations with constant coefficients, `dx = (A x + b) dt + dw`, as a [`Transition`](super::Transition) has it; row by row,
+/// without the entries that are zero whatever the coefficients are.
+pub(crate) struct Crossing<S> {
+    pub n: usize,
+    /// `e^{Ah}`.
+    pub kept: Vec<Option<S>>,
+    /// What a constant rate adds.
+    pub constant: Vec<Option<S>>,
+    /// What a rate adds that grows from zero.
+    pub ramp: Vec<Option<S>>,
+    /// What the noise adds to the covariance.
+    pub covariance: Vec<Option<S>>,
+}
+
+impl<S: Scalar> Crossing<S> {
+    fn times(&self, row: usize, entries: &[Option<S>], vector: &[S]) -> impl Iterator<Item = S> {
+        let row = entries[row * self.n..][..self.n].iter().zip(vector);
+        let products: Vec<S> = row.filter_map(|(entry, x)| entry.map(|entry| entry * *x)).collect();
+        products.into_iter()
+    }
+
+    /// The state at the end, from `A x + b` with the state at the begin and the `b` at the begin and at the end, if that is another.
+    pub fn state(&self, x: &mut [S], begin: &[S], end: Option<&[S]>) {
+        let change: Option<Vec<S>> = end.map(|end| end.iter().zip(begin).map(|(end, begin)| *end - *begin).collect());
+        for (i, x) in x.iter_mut().enumerate() {
+            let constant = self.times(i, &self.constant, begin);
+            let ramp = change.iter().flat_map(|change| self.times(i, &self.ramp, change));
+            *x = constant.chain(ramp).fold(*x, |sum, term| sum + term);
+        }
+    }
+
+    /// The covariance at the end, upper triangle row by row.
+    pub fn spread(&self, covariance: &mut [S]) {
+        let n = self.n;
+        let column = |j: usize| (0..n).map(|k| covariance[entry(n, k, j)]).collect::<Vec<S>>();
+        let columns: Vec<Vec<S>> = (0..n).map(column).collect();
+        let moved = |i: usize, j: usize| self.times(i, &self.kept, &columns[j]).reduce(|sum, term| sum + term);
+        let moved: Vec<Vec<Option<S>>> = (0..n).map(|i| (0..n).map(|j| moved(i, j)).collect()).collect();
+        for i in 0..n {
+            for j in i..n {
+                let row = self.kept[j * n..][..n].iter().zip(&moved[i]);
+                let terms = row.filter_map(|(entry, moved)| entry.zip(*moved)).map(|(entry, moved)| entry * moved);
+                let sum = terms.chain(self.covariance[i * n + j]).reduce(|sum, term| sum + term);
+                covariance[entry(n, i, j)] = sum.unwrap_or_else(|| S::from(0.0));
+            }
+        }
+    }
+}
