@@ -24,7 +24,7 @@ pub use plant::Plant;
 pub(crate) use plant::{Between, Intervals, SlicePlant, Stepped, jacobian};
 pub use second_order::SecondOrder;
 pub use starting::Starting;
-pub(crate) use symbolic::recurrence;
+pub(crate) use symbolic::{numbers, recurrence};
 
 use crate::error::Error;
 use crate::graph::Symbol;
@@ -149,6 +149,8 @@ pub(crate) trait Prediction: Debug + Send + Sync {
     /// Whether it predicts a variance by the model's process noise, as far as is known.
     fn takes_diffusion(&self) -> bool;
     fn starts_from(&self) -> StartsFrom;
+    /// Numbers that a plant in symbols has after its parameters: programs of filters that differ in them are one.
+    fn numbers(&self) -> Vec<f64>;
     /// This predictor to the second order, of a filter of first order.
     fn second_order(&self) -> Option<Arc<dyn Prediction>>;
     fn check(&self, layout: &Layout) -> Result<(), Error>;
@@ -212,6 +214,11 @@ impl<P: Predictor> Prediction for P {
 
     fn starts_from(&self) -> StartsFrom {
         Predictor::starts_from(self)
+    }
+
+    fn numbers(&self) -> Vec<f64> {
+        let this: &dyn Any = self;
+        this.downcast_ref::<GivenNoise>().map_or(vec![], GivenNoise::levels)
     }
 
     fn second_order(&self) -> Option<Arc<dyn Prediction>> {

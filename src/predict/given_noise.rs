@@ -49,23 +49,38 @@ struct Expected<S> {
 }
 
 impl GivenNoise {
+    /// Of the states, then of the outputs.
+    pub(super) fn levels(&self) -> Vec<f64> {
+        [&*self.states, &*self.outputs].concat()
+    }
+
+    /// One of these: where a program of many filters is made, the number that the plant has for it.
+    fn level<S: Scalar>(&self, plant: &dyn Plant<S>, number: usize) -> S {
+        let after = plant.layout().parameters.len() + number;
+        plant.parameters().get(after).copied().unwrap_or_else(|| S::from(self.levels()[number]))
+    }
+
+    fn of_output<S: Scalar>(&self, plant: &dyn Plant<S>, output: usize) -> S {
+        self.level(plant, self.states.len() + output)
+    }
+
     fn expected<S: Scalar>(&self, plant: &dyn Plant<S>, carry: &[S], output: usize) -> Expected<S> {
         let (n, outputs) = (plant.layout().states.len(), plant.layout().outputs.len());
         let mut slopes = vec![S::from(0.0); outputs * n];
         plant.output_slopes(&carry[..n], &mut slopes);
         let (c, root) = (&slopes[output * n..][..n], &carry[n..]);
         let row: Vec<S> = (0..n).map(|j| (0..n).map(|i| c[i] * root[i * n + j]).sum()).collect();
-        let noise = self.outputs[output] * self.outputs[output];
-        let variance = row.iter().map(|entry| *entry * *entry).sum::<S>() + noise;
+        let noise = self.of_output(plant, output);
+        let variance = row.iter().map(|entry| *entry * *entry).sum::<S>() + noise * noise;
         Expected { mean: mean(plant, carry, output), row, variance }
     }
 
     /// Adds the errors of an interval: rotates `[S, errors]` to a root of as many columns as before.
-    fn widen<S: Scalar>(&self, root: &mut [S]) {
+    fn widen<S: Scalar>(&self, plant: &dyn Plant<S>, root: &mut [S]) {
         let n = self.states.len();
         let mut added = vec![S::from(0.0); n * n];
-        for (i, error) in self.states.iter().enumerate() {
-            added[i * n + i] = S::from(*error);
+        for i in 0..n {
+            added[i * n + i] = self.level(plant, i);
         }
         for i in 0..n {
             // The first rotation is with the column whose entry is positive, so that no length is zero.
@@ -149,7 +164,7 @@ impl Predictor for GivenNoise {
         let n = plant.layout().states.len();
         let Expected { row, variance, .. } = self.expected(plant, carry, output);
         let (x, root) = carry.split_at_mut(n);
-        let shrunk = S::from(1.0) / (variance + variance.sqrt() * self.outputs[output]);
+        let shrunk = S::from(1.0) / (variance + variance.sqrt() * self.of_output(plant, output));
         for (i, x) in x.iter_mut().enumerate() {
             let moved = (0..n).map(|j| root[i * n + j] * row[j]).sum::<S>();
             *x += moved / variance * error;
@@ -174,7 +189,7 @@ impl Predictor for GivenNoise {
             }
             _ => plant.integrate(carry, &rate)?,
         }
-        self.widen(&mut carry[n..]);
+        self.widen(plant, &mut carry[n..]);
         Ok(())
     }
 

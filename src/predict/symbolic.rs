@@ -25,6 +25,7 @@ pub(crate) fn recurrence(
     let (carried, outputs) = (predictor.carry(layout), layout.outputs.len());
     let slopes = predictor.needs_slopes().then(|| Slopes::of(equations));
     let moments = OnceCell::new();
+    let numbers = numbers(equations, predictor).len();
     let number = |i: usize| u32::try_from(i).unwrap_or(u32::MAX);
     let mut graph = Graph::default();
     let roots = graph.trace(|| {
@@ -32,7 +33,7 @@ pub(crate) fn recurrence(
             interval: SymbolicInterval::new(equations, method, holds),
             slopes: slopes.as_ref(),
             moments: &moments,
-            p: (0..layout.parameters.len()).map(|j| Symbol::leaf(Leaf::Parameter(number(j)))).collect(),
+            p: (0..layout.parameters.len() + numbers).map(|j| Symbol::leaf(Leaf::Parameter(number(j)))).collect(),
         };
         let steps = predictor.symbols();
         let mut carry: Vec<Symbol> = (0..carried).map(|i| Symbol::leaf(Leaf::State(number(i)))).collect();
@@ -61,6 +62,11 @@ pub(crate) fn recurrence(
     let linear = method.is_exact().then(|| equations.linear()).flatten();
     let following = linear.map_or(vec![], |linear| linear.following());
     Ok(made.started(started(equations, slopes.as_ref(), predictor)).with_following(following))
+}
+
+/// The numbers that follow the parameters in a program; none where those of dead times do, then they are constants.
+pub(crate) fn numbers(equations: &Equations, predictor: &dyn Prediction) -> Vec<f64> {
+    if equations.late().contains(&true) { vec![] } else { predictor.numbers() }
 }
 
 /// The states and parameters on which the start depends.

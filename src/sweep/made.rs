@@ -57,6 +57,16 @@ fn evaluated(
     Arc::new(DualSweep { layout, code, method, predictor, uncompiled })
 }
 
+/// The sweep of equations in dual numbers, beside their programs.
+pub(super) fn of_equations_in_duals(
+    equations: &Arc<Equations>,
+    method: &Arc<dyn Method>,
+    predictor: &Arc<dyn Prediction>,
+) -> Arc<dyn Sweep> {
+    let choices = Some(choices(equations.graph()));
+    evaluated(equations, method, predictor, Uncompiled { reason: String::new(), choices })
+}
+
 /// The sweep of equations.
 ///
 /// # Errors

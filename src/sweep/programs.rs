@@ -9,7 +9,7 @@ mod late;
 mod run;
 mod workspace;
 
-use super::made::of_equations;
+use super::made::{of_equations, of_equations_in_duals};
 use super::{Coupling, Lacking, NoStart, Piece, Prepared, Reached, RunError, Seed, States, Sweep, Undisturbed, Visit};
 use crate::engine::{Program, Sampling, Trajectories};
 use crate::equations::{Equations, WithTerms};
@@ -18,7 +18,7 @@ use crate::graph::Untraceable;
 use crate::integrate::Method;
 use crate::interval::Hold;
 use crate::layout::{Kind, Layout};
-use crate::predict::{FreeRun, GivenNoise, Guess, Prediction, recurrence};
+use crate::predict::{FreeRun, GivenNoise, Guess, Prediction, numbers, recurrence};
 use crate::record::{Holds, Initial, Record, Time};
 use crate::recurrence::Recurrence;
 use crossed::Crossed;
@@ -32,6 +32,8 @@ use workspace::Compiled;
 /// Equations run by compiled programs.
 pub(crate) struct ProgramSweep<'a> {
     programs: Arc<Programs>,
+    /// What the programs have after the parameters.
+    numbers: Vec<f64>,
     /// These equations in dual numbers, for all that is not a pass over many samples.
     plain: Arc<dyn Sweep + 'a>,
 }
@@ -48,6 +50,8 @@ struct Programs {
     compiled: Mutex<Vec<(Key, MaybeCompiled)>>,
     /// This sweep with a finer step, if there is one.
     refined: OnceLock<Option<Arc<Programs>>>,
+    /// Filters with given levels of noise, if there can be any.
+    filtering: OnceLock<Option<Arc<Programs>>>,
     /// The sweep with terms that the equations might lack, made when it is first needed.
     lacking: OnceLock<Option<Lacking<'static>>>,
 }
@@ -93,9 +97,22 @@ impl<'a> ProgramSweep<'a> {
         predictor: Arc<dyn Prediction>,
         plain: Arc<dyn Sweep + 'a>,
     ) -> Result<Self, Untraceable> {
+        let numbers = numbers(&equations, &*predictor);
         let programs = Arc::new(Programs::new(equations, method, predictor)?);
-        Ok(ProgramSweep { programs, plain })
+        Ok(ProgramSweep { programs, numbers, plain })
     }
+}
+
+impl ProgramSweep<'_> {
+    /// The parameters of pieces as the programs have them.
+    fn parameters(&self, pieces: &[Piece<'_>]) -> Vec<Vec<f64>> {
+        pieces.iter().map(|piece| [piece.parameters, &self.numbers].concat()).collect()
+    }
+}
+
+/// Pieces with other parameters.
+fn with_parameters<'p>(pieces: &'p [Piece<'_>], parameters: &'p [Vec<f64>]) -> impl Iterator<Item = Piece<'p>> {
+    pieces.iter().zip(parameters).map(|(piece, parameters)| Piece { parameters, ..piece.lent() })
 }
 
 impl Programs {
@@ -111,8 +128,9 @@ impl Programs {
             None => Coupling::Nonlinear,
         };
         let (recurrences, compiled, refined) = (Mutex::new(vec![]), Mutex::new(vec![]), OnceLock::new());
-        let lacking = OnceLock::new();
-        let programs = Programs { equations, method, predictor, coupling, recurrences, compiled, refined, lacking };
+        let (filtering, lacking) = (OnceLock::new(), OnceLock::new());
+        let programs =
+            Programs { equations, method, predictor, coupling, recurrences, compiled, refined, filtering, lacking };
         programs.recurrence(&Holds::All(Hold::Zero))?;
         Ok(programs)
     }
@@ -225,18 +243,24 @@ impl Sweep for ProgramSweep<'_> {
         let Some(program) = self.programs.program(first.record, seeds, Purpose::Rows) else {
             return self.plain.run(pieces, seeds, visit);
         };
+        let parameters = self.parameters(pieces);
+        let pieces: Vec<Piece<'_>> = with_parameters(pieces, &parameters).collect();
         match self.programs.predictor.restarts() {
             Some(horizon) => {
                 let one = |piece| horizon::run(&program, piece, horizon.steps, visit);
                 pieces.iter().map(one).collect()
             }
-            None => Run::new(&program, pieces.to_vec()).all(visit),
+            None => Run::new(&program, pieces).all(visit),
         }
     }
 
     fn follow(&self, piece: &Piece<'_>, at: &[usize]) -> Result<Vec<Vec<f64>>, RunError> {
         match self.programs.program(piece.record, &[], Purpose::Carry) {
-            Some(program) => Run::new(&program, vec![piece.clone()]).follow(at),
+            Some(program) => {
+                let parameters = self.parameters(std::slice::from_ref(piece));
+                let piece = with_parameters(std::slice::from_ref(piece), &parameters);
+                Run::new(&program, piece.collect()).follow(at)
+            }
             None => self.plain.follow(piece, at),
         }
     }
@@ -279,7 +303,7 @@ impl Sweep for ProgramSweep<'_> {
         let plain = self.plain.refined(samples)?;
         let programs = if samples >= WORTH_COMPILING { self.programs.refined() } else { None };
         Some(match programs {
-            Some(programs) => Arc::new(ProgramSweep { programs, plain }),
+            Some(programs) => Arc::new(ProgramSweep { programs, numbers: self.numbers.clone(), plain }),
             None => plain,
         })
     }
@@ -297,10 +321,19 @@ impl Sweep for ProgramSweep<'_> {
     }
 
     fn filtering<'s>(&'s self, noise: &GivenNoise) -> Option<Arc<dyn Sweep + 's>> {
+        let equations = &self.programs.equations;
         let predictor: Arc<dyn Prediction> = Arc::new(noise.clone());
+        predictor.check(equations.layout()).ok()?;
         let method = self.programs.method.otherwise().unwrap_or_else(|| self.programs.method.clone());
-        let sweep: Arc<dyn Sweep> = of_equations(&self.programs.equations, &method, &predictor).ok()?;
-        Some(sweep)
+        let plain = of_equations_in_duals(equations, &method, &predictor);
+        let numbers = numbers(equations, &*predictor);
+        let make = || Programs::new(equations.clone(), method, predictor).ok().map(Arc::new);
+        // With dead times, levels are constants of the programs.
+        let programs = if numbers.is_empty() { make() } else { self.programs.filtering.get_or_init(make).clone() };
+        Some(match programs {
+            Some(programs) => Arc::new(ProgramSweep { programs, numbers, plain }),
+            None => plain,
+        })
     }
 
     fn with_terms<'s>(&'s self) -> Option<Lacking<'s>> {
