@@ -32,6 +32,9 @@ const FAR: f64 = 2.0;
 /// Where the slopes of all unknowns explain those of a term but for this part or less, the data do not tell the two apart.
 const SAME: f64 = 1e-4;
 
+/// With terms, equations that else are crossed exactly go by steps: where these change `-ln` of the likelihood by more, they are too coarse.
+const STEPPED: f64 = 0.1;
+
 /// A term that the likelihood is asked about.
 struct Asked {
     term: usize,
@@ -74,7 +77,10 @@ fn missing_terms(evidence: &Evidence<'_>, intervals: &Intervals) -> Examined {
     }
     let left_out = (made.left_out > 0).then(|| counted(made.left_out as u64, "term"));
     let count = made.terms.len();
-    let asked = asked(evidence, intervals, made.sweep, count).into_iter().map(|asked| (asked.severity(count), asked));
+    let Some(asked) = asked(evidence, intervals, made.sweep, count) else {
+        return Examined::from(None).without(Some("models that take more than four steps per sample"));
+    };
+    let asked = asked.into_iter().map(|asked| (asked.severity(count), asked));
     let told = asked.filter(|(severity, _)| *severity > Severity::Usable);
     let worst = told.max_by(|(a, one), (b, other)| a.cmp(b).then(one.errors.total_cmp(&other.errors)));
     let warning = worst.map(|(severity, asked)| {
@@ -93,21 +99,30 @@ fn missing_terms(evidence: &Evidence<'_>, intervals: &Intervals) -> Examined {
     Examined::from(warning).without(left_out)
 }
 
-/// What the likelihood says of each term that is told from the unknowns; nothing where its slopes are not known.
-fn asked(evidence: &Evidence<'_>, intervals: &Intervals, sweep: Arc<dyn Sweep + '_>, terms: usize) -> Vec<Asked> {
+/// What the likelihood says of each term that is told from the unknowns; `None` where it cannot be evaluated with these terms.
+fn asked(
+    evidence: &Evidence<'_>,
+    intervals: &Intervals,
+    sweep: Arc<dyn Sweep + '_>,
+    terms: usize,
+) -> Option<Vec<Asked>> {
     let objective = evidence.point.objective;
     let of = objective.problem;
     let first = of.parameters().len();
     let parameters: Vec<_> = of.parameters().iter().copied().chain((0..terms).map(|_| free(0.0))).collect();
     let settings = of.settings.beside(Noise::Predicted);
-    let Ok(problem) = Problem::new(sweep, of.records.clone(), &parameters, settings) else { return vec![] };
+    let problem = Problem::new(sweep, of.records.clone(), &parameters, settings).ok()?;
     // Each unknown of the fit is one of this problem, too; the factors of the terms are zero.
     let key = |free: &Free| (free.role, free.experiment);
     let known: HashMap<_, usize> = of.unknowns.row.iter().enumerate().map(|(i, free)| (key(free), i)).collect();
     let row = &problem.unknowns.row;
     let from: Vec<Option<usize>> = row.iter().map(|free| known.get(&key(free)).copied()).collect();
     let coordinates: Vec<f64> = from.iter().map(|i| i.map_or(0.0, |i| evidence.point.end.coordinates[i])).collect();
-    let Ok(linear) = problem.in_units(objective.control).evaluate(&coordinates) else { return vec![] };
+    let linear = problem.in_units(objective.control).evaluate(&coordinates).ok()?;
+    let same = (linear.cost - evidence.point.linear.cost).abs() <= STEPPED;
+    if !same {
+        return None;
+    }
     let known = |i: usize| intervals.unknowns[i].knowledge.standard_error();
     let held: Vec<bool> = from.iter().map(|i| i.is_none_or(|i| known(i).is_none())).collect();
     let norms = linear.column_norms();
@@ -130,5 +145,5 @@ fn asked(evidence: &Evidence<'_>, intervals: &Intervals, sweep: Arc<dyn Sweep + 
         Some(Asked { term: number.checked_sub(first)?, errors: (step[at] / error).abs(), moved, unknown })
     };
     let asked = (0..row.len()).filter(|at| from[*at].is_none()).filter_map(ask);
-    asked.filter(|asked| asked.errors.is_finite() && asked.moved.is_finite()).collect()
+    Some(asked.filter(|asked| asked.errors.is_finite() && asked.moved.is_finite()).collect())
 }
