@@ -6,12 +6,15 @@ mod elsewhere;
 mod fittable;
 mod fleet;
 mod lockstep;
+mod moves;
+mod pieces;
 mod predict;
 #[cfg(feature = "parallel")]
 mod prefetch;
 mod refine;
 mod run;
 mod search;
+mod shooting;
 mod simulate;
 mod simulated;
 mod staged;
@@ -33,7 +36,7 @@ use crate::optimize::LeastSquaresState;
 use crate::parameter::Parameter;
 use crate::predict::Predictor;
 use crate::prefilter::Butterworth;
-use crate::problem::{Noise, Problem, Search, SearchPlan, Settings};
+use crate::problem::{Lead, Noise, Problem, Search, SearchPlan, Settings};
 use crate::record::Record;
 use crate::weighting::Weighting;
 use argmin::core::observers::{Observe, ObserverMode};
@@ -262,7 +265,12 @@ impl<'a, M: Made> Fit<'a, M> {
     /// # }
     /// ```
     pub fn staged(self) -> Self {
-        self.set(|settings| settings.staged = true)
+        self.set(|settings| settings.lead = Lead::Stages)
+    }
+
+    /// Multiple shooting.
+    pub fn multiple_shooting(self) -> Self {
+        self.set(|settings| settings.lead = Lead::Shooting)
     }
 
     /// Stops the search at its best point so far when the flag is set (by another thread, a signal handler).

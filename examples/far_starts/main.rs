@@ -54,6 +54,9 @@ struct Arguments {
     /// In stages from the first search on.
     #[arg(long, conflicts_with = "plain")]
     staged: bool,
+    /// By multiple shooting alone before the first search.
+    #[arg(long, conflicts_with_all = ["plain", "staged"])]
+    shooting: bool,
     /// Prints the estimate of each fit.
     #[arg(long)]
     verbose: bool,
@@ -93,6 +96,7 @@ impl Study<'_> {
             (Some(count), _) => fit.starts(count),
             (None, true) => fit.starts(1),
             _ if self.0.staged => fit.staged(),
+            _ if self.0.shooting => fit.multiple_shooting(),
             _ => fit,
         }
     }
