@@ -3,10 +3,10 @@
 
 use super::refine::{Start, is_only_coarse, is_useless};
 use super::staged::noted;
-use crate::estimate::{About, Summary, Warning, WarningCode};
 use super::stages::Led;
+use crate::estimate::{About, Summary, Warning, WarningCode};
 use crate::numeral::counted;
-use crate::problem::{Lead, Control, Noise, Problem, SearchPlan, Settings};
+use crate::problem::{Control, Lead, Noise, Problem, SearchPlan, Settings};
 use crate::severity::Severity;
 use std::time::{Duration, Instant};
 
@@ -214,9 +214,7 @@ impl Problem<'_> {
         let most = if self.runs_in_lanes() { LONGEST_IN_LANES } else { LONGEST };
         if self.samples() > most {
             let staged = self.searched_in_stages(begin, control);
-            return Some(
-                staged.map_or(Further::TooLong(most), |(best, led)| as_further(best, Way::Stages(led))),
-            );
+            return Some(staged.map_or(Further::TooLong(most), |(best, led)| as_further(best, Way::Stages(led))));
         }
         let settings = Settings { checkpoint: None, searches: SearchPlan::Best(STARTS), ..self.settings.clone() };
         let problem = Problem { settings, finer: None, ..self.clone() };

@@ -2,8 +2,8 @@
 
 use super::elsewhere::leaves_unexplained;
 use super::refine::Start;
-use super::stages::Led;
 use super::staged::note;
+use super::stages::Led;
 use crate::error::Error;
 use crate::estimate::Summary;
 use crate::numeral::number;
@@ -31,9 +31,11 @@ impl Problem<'_> {
     }
 
     fn by_pieces(&self, found: &Summary, led: &Led, control: &Control) -> Option<Summary> {
-        let own = self.unknowns.row.iter().any(|unknown| {
-            matches!(unknown.role, Role::Parameter(_)) && unknown.experiment.is_some()
-        });
+        let own = self
+            .unknowns
+            .row
+            .iter()
+            .any(|unknown| matches!(unknown.role, Role::Parameter(_)) && unknown.experiment.is_some());
         let (shot, begin) = (led.shot.as_ref()?, Instant::now());
         let count = |k: &u32| 1usize << k;
         for count in (1..).map(|k| count(&k)).take_while(|count| *count <= MOST && !own) {
@@ -45,9 +47,6 @@ impl Problem<'_> {
             let (problem, coordinates) = self.cut_at(&begins, &shot.coordinates).ok()?;
             let start = Start { coordinates, ..Start::declared(&problem) };
             let Ok(parts) = problem.run_within(begin, control, start) else { continue };
-            if std::env::var("MS").is_ok() {
-                eprintln!("{count} pieces: {parts}");
-            }
             if parts.severity() == Severity::NotUsable {
                 continue;
             }
@@ -55,7 +54,9 @@ impl Problem<'_> {
             let (evaluations, seconds) =
                 (found.evaluations + parts.evaluations, found.seconds + begin.elapsed().as_secs_f64());
             let mut whole = Summary { iterations: found.iterations, evaluations, seconds, ..whole };
-            whole.warnings.extend(found.warnings.iter().filter(|warning| warning.code == note(String::new()).code).cloned());
+            whole
+                .warnings
+                .extend(found.warnings.iter().filter(|warning| warning.code == note(String::new()).code).cloned());
             whole.warnings.push(note(said(&parts, problem.records())));
             return Some(whole);
         }
@@ -103,9 +104,7 @@ impl Problem<'_> {
         let of = |i: usize| {
             let unknown = &self.unknowns.row[i];
             let piece = unknown.experiment.map(|e| begins.iter().position(|(of, _, _)| *of == e).unwrap_or_default());
-            let same = |other: &crate::estimate::Unknown| {
-                other.role == unknown.role && other.experiment == piece
-            };
+            let same = |other: &crate::estimate::Unknown| other.role == unknown.role && other.experiment == piece;
             let found = parts.unknowns.iter().position(same);
             found.map_or(unknown.parameter.transform.to_coordinate(unknown.parameter.start), |i| coordinates[i])
         };
@@ -125,7 +124,8 @@ fn begins(e: usize, nodes: &[(usize, Vec<f64>)], count: usize) -> Vec<Begin> {
 fn said(parts: &Summary, pieces: &[Record]) -> String {
     let parameters = parts.unknowns.iter().filter(|unknown| matches!(unknown.role, Role::Parameter(_)));
     let one = |unknown: &crate::estimate::Unknown| {
-        let error = unknown.knowledge.standard_error().map_or_else(String::new, |error| format!(" +- {}", number(error, 2)));
+        let error =
+            unknown.knowledge.standard_error().map_or_else(String::new, |error| format!(" +- {}", number(error, 2)));
         format!("`{}` = {}{error}", unknown.name, number(unknown.value, 5))
     };
     let parameters: Vec<String> = parameters.map(one).collect();

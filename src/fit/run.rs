@@ -13,7 +13,7 @@ use crate::error::Error;
 use crate::estimate::Summary;
 use crate::judge::conclude;
 use crate::optimize::{Domain, LeastSquares, LevenbergMarquardt, Outcome};
-use crate::problem::{Lead, Control, Objective, Problem, SearchPlan, Settings, Simulated, Whitening, noise};
+use crate::problem::{Control, Lead, Objective, Problem, SearchPlan, Settings, Simulated, Whitening, noise};
 use crate::record::Record;
 use crate::sweep::States;
 use std::time::Instant;

@@ -1,34 +1,35 @@
 //! Multiple shooting for far starts: the records in pieces that begin near the measurements, and continuity asked for step by step.
 
 use super::moves::{Movement, NEAR};
-use crate::optimize::{Domain, LeastSquares, LevenbergMarquardt, Machine, OwnSize, Request, Stop};
 use crate::numeral::number;
+use crate::optimize::{Domain, LeastSquares, LevenbergMarquardt, Machine, OwnSize, Request, Stop};
 use crate::problem::{Control, Objective, Problem, Shooting, Whitening};
 use crate::record::Record;
 use std::fmt;
-
-fn tune(name: &str, default: f64) -> f64 {
-    std::env::var(name).ok().and_then(|text| text.parse().ok()).unwrap_or(default)
-}
 
 /// The least noise of an output that pieces are compared with, as a part of half its range.
 const LEAST_NOISE: f64 = 0.01;
 /// The least samples of a piece.
 const LEAST: usize = 8;
-/// Pieces from the start explain the outputs where their error is at most this part of half the range; else they are halved.
-const EXPLAINED: f64 = 0.2;
-/// Pieces of a quarter of the length follow where longer ones do not lead to the measurements.
-const SHORTER: usize = 4;
-/// A search with fixed multipliers ends where the next step would lower the cost by this part, or after so many trial steps.
-const INNER: Stop = Stop { step: 1e-10, gradient: 1e-8, cost: 1e-6, iterations: 20 };
+/// The first pieces are the longest ones, in halvings, whose error from the start is at most this part of half the range: with shorter ones, the
+/// measurements of a piece say less of the parameters.
+const EXPLAINED: f64 = 0.5;
+/// Pieces of half the length follow where an end is not near the noise; so many lengths are tried.
+const LENGTHS: usize = 4;
+/// A search with fixed multipliers ends where the next step would lower the cost by this part. Multipliers that change before, or a penalty that rises,
+/// lead to other minima.
+const INNER: Stop = Stop { step: 1e-10, gradient: 1e-8, cost: 1e-4, iterations: 500 };
 /// The most searches.
 const ROUNDS: usize = 40;
-/// The penalty is raised where the largest gap did not shrink to this part.
+/// The penalty rises where the largest gap did not shrink to this part; after so many searches in which it did not, rounding is what is left.
 const SHRUNK: f64 = 0.25;
-/// So many searches in which the largest gap does not shrink to this part are the last ones.
 const STUCK: usize = 6;
-/// Continuity is closed where the largest gap is at most this part of the noise.
-const CLOSED: f64 = 1e-9;
+/// The last search is the one after which the largest gap is at most this part of the noise: a chaotic plant makes gaps larger by a factor of 1e8.
+const LAST: f64 = 1e-9;
+/// Continuity is closed where the largest gap is at most this part of the noise, and pieces explain the measurements where their error is at most so many
+/// times the noise.
+const CLOSED: f64 = 1e-3;
+const EXPLAINS: f64 = 1.5;
 
 /// The end of multiple shooting.
 pub(super) struct Shot {
@@ -46,14 +47,17 @@ pub(super) struct Shot {
 impl Shot {
     /// Whether continuity is closed and the errors are near the noise: a wrong minimum may be closed, too.
     pub fn explains(&self) -> bool {
-        self.gap <= CLOSED && self.misfit <= NEAR
+        self.gap <= CLOSED && self.misfit <= EXPLAINS
     }
 }
 
 impl fmt::Display for Shot {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (pieces, gap, misfit) = (self.pieces, number(self.gap, 1), number(self.misfit, 2));
-        write!(f, "multiple shooting ({pieces} pieces; in units of the noise, the largest gap is {gap} and the rms error {misfit})")
+        write!(
+            f,
+            "multiple shooting ({pieces} pieces; in units of the noise, the largest gap is {gap} and the rms error {misfit})"
+        )
     }
 }
 
@@ -87,22 +91,21 @@ pub(super) fn shoot(
     }
     let filter = filter.map(|filter| filter.in_units(control));
     let aim = Aim::new(problem, movement, filter, start, control).ok_or("the outputs are undefined at the start")?;
-    let length = (tune("MS_LENGTH", 1.0) / (movement.rate * movement.step)) as usize;
+    let length = (movement.rate * movement.step).recip() as usize;
     let mut length = length.clamp(LEAST, longest / 2);
     let (mut best, mut evaluations): (Option<Shot>, u64) = (None, 0);
-    loop {
+    for _ in 0..LENGTHS {
         let (explained, shooting, x) = aim.explained(length)?;
-        length = explained;
         let shot = aim.shot(shooting, x, control).ok_or("the search was stopped")?;
         evaluations += shot.evaluations;
         let order = |shot: &Shot| (shot.gap > CLOSED, shot.misfit);
         if best.as_ref().is_none_or(|best| order(&shot) < order(best)) {
             best = Some(shot);
         }
-        if best.as_ref().is_some_and(Shot::explains) || length <= LEAST || control.stops() {
+        if best.as_ref().is_some_and(Shot::explains) || explained == LEAST || control.stops() {
             break;
         }
-        length = (length / SHORTER).max(LEAST);
+        length = (explained / 2).max(LEAST);
     }
     best.map(|shot| Shot { evaluations, ..shot }).ok_or("the search was stopped")
 }
@@ -116,12 +119,12 @@ impl<'s> Aim<'s> {
         control: &'s Control,
     ) -> Option<Self> {
         let positive = |value: f64| if value > 0.0 { value } else { 1.0 };
-        let noise = movement.outputs.iter().map(|moves| moves.noise.max(tune("MS_NOISE", LEAST_NOISE) * moves.half));
+        let noise = movement.outputs.iter().map(|moves| moves.noise.max(LEAST_NOISE * moves.half));
         let sigma: Vec<f64> = noise.map(positive).collect();
         let parts = movement.outputs.iter().zip(&sigma).filter(|(moves, _)| moves.half > 0.0);
         let part = parts.clone().map(|(moves, sigma)| sigma / moves.half).fold(0.0, f64::max);
         let squares = parts.clone().map(|(moves, sigma)| (moves.half / sigma).powi(2)).sum::<f64>();
-        let unexplained = tune("MS_EXPLAINED", EXPLAINED) * (squares / parts.count() as f64).sqrt();
+        let unexplained = EXPLAINED * (squares / parts.count() as f64).sqrt();
         let sizes = problem.scales(problem.records.first()?, movement.rate)?.into_iter().map(positive).collect();
         let outputs = problem.records.iter().flat_map(Record::outputs);
         let rows = outputs.map(|output| output.values.iter().filter(|y| !y.is_nan()).count()).sum();
@@ -137,20 +140,19 @@ impl<'s> Aim<'s> {
     /// Pieces that explain the outputs at the start, of at most so many samples, or the shortest ones.
     fn explained(&self, mut length: usize) -> Result<(usize, Shooting<'_>, Vec<f64>), &'static str> {
         loop {
-            let penalty = tune("MS_PENALTY", 1.0) * self.part.powi(-2);
+            let penalty = self.part.powi(-2);
             let shooting = Shooting::new(&self.objective, length, self.sizes.clone(), penalty);
             let nodes = (0..self.objective.experiments()).map(|e| self.nodes(e, &shooting.nodes_at(e)));
             let nodes: Vec<Vec<Vec<f64>>> = nodes.collect::<Result<_, _>>()?;
             let x = shooting.point(self.start, &nodes);
             let misfit = shooting.pass(&x).map_or(f64::INFINITY, |passed| self.misfit(passed.cost));
-            if std::env::var("MS").is_ok() {
-                eprintln!("length {length} pieces {} misfit {misfit} unexplained {}", shooting.count(), self.unexplained);
-            }
             if misfit <= self.unexplained || misfit.is_finite() && length <= LEAST {
                 return Ok((length, shooting, x));
             }
             if length <= LEAST {
-                return Err("pieces of eight samples cannot be simulated from the start; bound the parameters, or start elsewhere");
+                return Err(
+                    "pieces of eight samples cannot be simulated from the start; bound the parameters, or start elsewhere",
+                );
             }
             length = (length / 2).max(LEAST);
         }
@@ -175,7 +177,7 @@ impl<'s> Aim<'s> {
     fn shot(&self, mut shooting: Shooting<'_>, mut x: Vec<f64>, control: &Control) -> Option<Shot> {
         let (mut evaluations, mut before, mut shot) = (0, f64::INFINITY, None);
         let (mut least, mut stuck) = (f64::INFINITY, 0);
-        for round in 0..ROUNDS {
+        for _ in 0..ROUNDS {
             shooting.begin_at(&x);
             let (end, count) = minimize(&shooting, x);
             x = end;
@@ -184,16 +186,22 @@ impl<'s> Aim<'s> {
             let gap = passed.gaps.iter().fold(0.0, |most: f64, gap| most.max(gap.abs())) / self.part;
             let misfit = self.misfit(passed.cost);
             let coordinates = shooting.coordinates(&x);
-            if std::env::var("MS").is_ok() {
-                eprintln!("round {round} evaluations {count} gap {gap:.3e} misfit {misfit:.4} {:?}", &coordinates);
-            }
-            shot = Some(Shot { coordinates, nodes: shooting.nodes(&x), pieces: shooting.count(), evaluations, gap, misfit });
+            // A search for parameters that explain pieces without continuity has not come near the noise.
+            let lost = count > INNER.iterations && misfit > NEAR;
+            shot = Some(Shot {
+                coordinates,
+                nodes: shooting.nodes(&x),
+                pieces: shooting.count(),
+                evaluations,
+                gap,
+                misfit,
+            });
             if gap <= SHRUNK * least {
                 (least, stuck) = (gap, 0);
             } else {
                 stuck += 1;
             }
-            if gap <= CLOSED || stuck >= tune("MS_STUCK", STUCK as f64) as usize || control.stops() {
+            if gap <= LAST || lost || stuck >= STUCK || control.stops() {
                 break;
             }
             shooting.tighten(&passed.gaps, gap <= SHRUNK * before);
@@ -205,8 +213,7 @@ impl<'s> Aim<'s> {
 
 /// The end of a search for the least cost with fixed multipliers, and its evaluations.
 fn minimize(shooting: &Shooting<'_>, start: Vec<f64>) -> (Vec<f64>, u64) {
-    let stop = Stop { cost: tune("MS_COST", INNER.cost), iterations: tune("MS_TRIALS", 20.0) as u64, ..INNER };
-    let mut search = LevenbergMarquardt::new(stop, OwnSize);
+    let mut search = LevenbergMarquardt::new(INNER, OwnSize);
     search.begin(start, Domain::of(shooting));
     let mut evaluations = 0;
     loop {
@@ -220,12 +227,7 @@ fn minimize(shooting: &Shooting<'_>, start: Vec<f64>) -> (Vec<f64>, u64) {
                 let answer = shooting.curvature(x, along);
                 search.tell_curvature(answer);
             }
-            Request::Ended(outcome) => {
-                if std::env::var("MS").is_ok() {
-                    eprintln!("  {outcome:?}");
-                }
-                return (search.place().to_vec(), evaluations);
-            }
+            Request::Ended(_) => return (search.place().to_vec(), evaluations),
         }
     }
 }

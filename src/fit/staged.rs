@@ -5,7 +5,7 @@ use super::refine::{Start, is_only_coarse};
 use super::stages::Led;
 use crate::error::Error;
 use crate::estimate::{About, Summary, Warning, WarningCode};
-use crate::problem::{Lead, Control, Problem, SearchPlan, Settings};
+use crate::problem::{Control, Lead, Problem, SearchPlan, Settings};
 use crate::severity::Severity;
 use std::time::Instant;
 

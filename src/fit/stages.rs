@@ -7,8 +7,8 @@
 
 use super::moves::{LEAST_NOISE, Movement, Moves, NEAR};
 use super::refine::Start;
-use super::shooting::{Shot, shoot};
 use super::search::search;
+use super::shooting::{Shot, shoot};
 use crate::numeral::counted;
 use crate::predict::{GivenNoise, Guess};
 use crate::problem::{Control, Lead, Noise, Problem, Settings, noise};
@@ -148,7 +148,12 @@ impl Stages<'_> {
         let follows = |memory: f64| {
             let problem = self.problem(memory)?;
             let errors = errors(&problem, start, control)?;
-            Some(errors.iter().zip(&self.movement.outputs).all(|(e, moves)| *e <= NEAR * moves.noise || moves.half == 0.0))
+            Some(
+                errors
+                    .iter()
+                    .zip(&self.movement.outputs)
+                    .all(|(e, moves)| *e <= NEAR * moves.noise || moves.half == 0.0),
+            )
         };
         while memory > least && follows(memory) != Some(true) && !control.stops() {
             memory = (memory / LONGER).max(least);
@@ -170,7 +175,8 @@ impl Stages<'_> {
             return nearer.map(|end| (end, led)).ok_or(NO_NEARER);
         }
         let distance = |at: &[f64]| self.distance(at).unwrap_or(f64::INFINITY);
-        let filter = self.problem(self.first_memory(&last, control));
+        let few = self.problem.layout().states.len() <= MOST_STATES;
+        let filter = few.then(|| self.problem(self.first_memory(&last, control))).flatten();
         match shoot((self.problem, &self.movement, filter.as_ref()), &last, control) {
             Ok(shot) => {
                 let led = Led { evaluations: led.evaluations + shot.evaluations, ..led };

@@ -45,10 +45,11 @@ pub(crate) struct Settings {
     pub(crate) checkpoint: Option<(PathBuf, u64)>,
     pub(crate) optimizer: Arc<dyn Optimizer>,
     pub(crate) searches: SearchPlan,
+    /// What leads each start to the data before the search.
     pub(crate) lead: Lead,
 }
 
-/// What leads each start to the data before the search.
+/// Fits of an easier cost before the search of a simulation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Lead {
     /// Nothing, unless the start cannot be simulated or explains nothing.

@@ -48,6 +48,7 @@ mod sensors;
 mod shared;
 #[path = "../common/spiral.rs"]
 mod spiral;
+mod shooting;
 mod stages;
 mod starts;
 mod step_errors;
