@@ -16,14 +16,14 @@ impl Problem<'_> {
         if self.settings.lead == Lead::Declared {
             return (declared, None);
         }
-        let asked = match self.settings.lead {
-            Lead::Shooting => "multiple shooting was asked for",
-            _ => "stages were asked for",
+        let (asked, none, its) = match self.settings.lead {
+            Lead::Shooting => ("multiple shooting was asked for", "there is none", "its"),
+            _ => ("stages were asked for", "there are none", "their"),
         };
         let (start, text) = match self.stages().map(|stages| (self.settings.searches.count() > 1, stages)) {
-            Err(reason) => (declared, format!("{asked}, but there are none: {reason}")),
+            Err(reason) => (declared, format!("{asked}, but {none}: {reason}")),
             Ok((true, _)) => {
-                (declared, format!("{asked}: each search began at their end, if that is nearer to the measurements"))
+                (declared, format!("{asked}: each search began at {its} end, if that is nearer to the measurements"))
             }
             Ok((false, stages)) => match stages.declared(control) {
                 Ok((start, led)) => (start, format!("the search began at the end of {}", led.path())),
@@ -80,7 +80,8 @@ pub(super) fn note(text: String) -> Warning {
 pub(super) fn after_stages(found: Summary, led: Option<&Led>) -> Summary {
     let Some(led) = led else { return found };
     let mut found = Summary { evaluations: found.evaluations + led.evaluations, ..found };
-    if !led.follows && leaves_unexplained(&found) {
+    let explained = led.follows || led.shot.as_ref().is_some_and(|shot| shot.explains());
+    if led.stages > 0 && !explained && leaves_unexplained(&found) {
         let text = "predictions of a filter that corrects the state at each sample follow the measurements where this search began, and a simulation \
                     does not: the plant may be unstable, chaotic or disturbed; take Kalman, with Model::diffusion and Model::noise";
         found.warnings.push(note(text.to_owned()));

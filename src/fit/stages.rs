@@ -37,8 +37,8 @@ const NO_NEARER: &str = "their end is no nearer to the measurements than the dec
 
 /// The stages of a problem.
 pub(super) struct Stages<'p> {
-    pub problem: &'p Problem<'p>,
-    pub movement: Movement,
+    problem: &'p Problem<'p>,
+    movement: Movement,
     /// Whether multiple shooting is all there is.
     alone: bool,
 }
@@ -123,7 +123,7 @@ impl Problem<'_> {
 impl Stages<'_> {
     /// The problem of a stage with this memory (s). The steady gain of a random walk whose increments are `part` times the noise of its measurements
     /// is about `part`, so that the influence of a measurement decays in `1 / part` intervals.
-    pub fn problem(&self, memory: f64) -> Option<Problem<'_>> {
+    fn problem(&self, memory: f64) -> Option<Problem<'_>> {
         let problem = self.problem;
         let scales = problem.scales(problem.records.first()?, self.movement.rate.max(memory.recip()))?;
         let part = self.movement.outputs.iter().filter(|moves| moves.half > 0.0).map(|moves| moves.noise / moves.half);
@@ -142,7 +142,7 @@ impl Stages<'_> {
 
     /// The memory of the first stage (s): the longest one, in steps of four, in which the outputs change by a small part of their range, and with which
     /// predictions from the start are near the measurements; else a part of an interval.
-    pub fn first_memory(&self, start: &[f64], control: &Control) -> f64 {
+    fn first_memory(&self, start: &[f64], control: &Control) -> f64 {
         let least = FIRST_MEMORY * self.movement.step;
         let mut memory = (FIRST_MEMORY / self.movement.rate).max(least);
         let follows = |memory: f64| {

@@ -46,9 +46,9 @@ mod segments;
 mod sensors;
 #[path = "../common/shared.rs"]
 mod shared;
+mod shooting;
 #[path = "../common/spiral.rs"]
 mod spiral;
-mod shooting;
 mod stages;
 mod starts;
 mod step_errors;

@@ -174,7 +174,10 @@ fn a_start_that_cannot_be_simulated_is_led_to_the_data() {
     let both = Fit::new(&Pushed, &records).parameters(each).multiple_shooting().run().unwrap();
     near(&both, &[95.0, -3.0, 200.0, 300.0]);
     let logarithm = Axis { m: free(0.2).log(), ..UNSTABLE };
-    near(&Fit::new(&Pushed, &records[0]).parameters(logarithm).multiple_shooting().run().unwrap(), &[95.0, 200.0, -3.0]);
+    near(
+        &Fit::new(&Pushed, &records[0]).parameters(logarithm).multiple_shooting().run().unwrap(),
+        &[95.0, 200.0, -3.0],
+    );
     let fleet = Fleet::new(&Pushed).parameters(UNSTABLE).multiple_shooting().fleet().unwrap();
     let together = fleet.run([records[0].clone()]).next().unwrap().unwrap();
     assert_eq!(together.evaluations, alone.evaluations);
@@ -208,11 +211,15 @@ fn what_has_no_pieces_says_so() {
         said(&change(Fit::new(&Pushed, record).parameters(near)).multiple_shooting().run().unwrap())
     };
     let short = told(&record.slice(..15).unwrap(), &|fit| fit);
-    assert!(short.contains("no record has two pieces of eight samples; the search began at the declared start"), "{short}");
+    assert!(
+        short.contains("no record has two pieces of eight samples; the search began at the declared start"),
+        "{short}"
+    );
     assert!(!told(&record.slice(..200).unwrap(), &|fit| fit).contains("asked for"));
     let filtered = told(&record, &|fit| fit.prefilter(Butterworth::low_pass(2, 20.0, 0.005).unwrap()));
     assert!(filtered.contains("the errors are filtered"), "{filtered}");
-    let opaque = Experiment::new(&Opaque, record.times().clone(), record.inputs().collect(), record.outputs().collect());
+    let opaque =
+        Experiment::new(&Opaque, record.times().clone(), record.inputs().collect(), record.outputs().collect());
     let opaque = Fit::new(&Opaque, &opaque.unwrap()).parameters(near).multiple_shooting().run().unwrap();
     assert!(said(&opaque).contains("outputs do not give the state where pieces begin"), "{opaque}");
 }

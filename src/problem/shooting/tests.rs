@@ -1,6 +1,6 @@
 use super::*;
 use crate::problem::{Control, Whitening};
-use crate::{Experiment, ExperimentOf, Fit, Model, Nothing, Rk4, Scalar, Time, fixed, free, signals};
+use crate::{ExperimentOf, Fit, Model, Nothing, Rk4, Scalar, Time, fixed, free, signals};
 
 signals! { struct Swing { angle: "rad", rate: "rad/s" } }
 signals! { struct Angle { angle: "rad" } }
@@ -59,8 +59,12 @@ fn slopes_are_those_of_the_cost() {
     assert_eq!((shooting.count(), shooting.penalty), (5 + 3, 30.0));
     let x = point(&shooting, &objective.start());
     let linear = shooting.linearize(&x).unwrap();
-    assert_eq!((linear.unknowns(), linear.rows()), (x.len(), 105));
-    assert_eq!((shooting.bounds().len(), shooting.sizes().len(), shooting.logarithms().len()), (x.len(), x.len(), x.len()));
+    // The measurements, and the prior.
+    assert_eq!((linear.unknowns(), linear.rows()), (x.len(), 105 + 1));
+    assert_eq!(
+        (shooting.bounds().len(), shooting.sizes().len(), shooting.logarithms().len()),
+        (x.len(), x.len(), x.len())
+    );
     for (i, slope) in linear.gradient().into_iter().enumerate() {
         let cost = |by: f64| {
             let mut moved = x.clone();
