@@ -5,9 +5,9 @@ use super::refine::Start;
 use super::staged::note;
 use super::stages::Led;
 use crate::error::Error;
-use crate::estimate::Summary;
+use crate::estimate::{Summary, Unknown, WarningCode};
 use crate::numeral::number;
-use crate::problem::{Control, Lead, Problem, Role, SearchPlan, Settings};
+use crate::problem::{Control, Problem, Role};
 use crate::record::Record;
 use crate::severity::Severity;
 use std::time::Instant;
@@ -37,8 +37,8 @@ impl Problem<'_> {
             .iter()
             .any(|unknown| matches!(unknown.role, Role::Parameter(_)) && unknown.experiment.is_some());
         let (shot, begin) = (led.shot.as_ref()?, Instant::now());
-        let count = |k: &u32| 1usize << k;
-        for count in (1..).map(|k| count(&k)).take_while(|count| *count <= MOST && !own) {
+        let counts = std::iter::successors(Some(2), |count| Some(2 * count));
+        for count in counts.take_while(|count| *count <= MOST && !own) {
             if control.stops() {
                 break;
             }
@@ -54,9 +54,7 @@ impl Problem<'_> {
             let (evaluations, seconds) =
                 (found.evaluations + parts.evaluations, found.seconds + begin.elapsed().as_secs_f64());
             let mut whole = Summary { iterations: found.iterations, evaluations, seconds, ..whole };
-            whole
-                .warnings
-                .extend(found.warnings.iter().filter(|warning| warning.code == note(String::new()).code).cloned());
+            whole.warnings.extend(found.warnings.iter().filter(|warning| warning.code == WarningCode::Staged).cloned());
             whole.warnings.push(note(said(&parts, problem.records())));
             return Some(whole);
         }
@@ -72,13 +70,7 @@ impl Problem<'_> {
         };
         let pieces = begins.iter().zip(ends).map(|((e, first, _), next)| self.records[*e].slice(*first..end(*e, next)));
         let pieces: Vec<Record> = pieces.collect::<Result<_, _>>()?;
-        let settings = Settings {
-            lead: Lead::Declared,
-            checkpoint: None,
-            observers: vec![],
-            searches: SearchPlan::All(1),
-            ..self.settings.clone()
-        };
+        let settings = self.settings.beside(self.settings.noise.clone());
         let problem = Problem::new(self.sweep.clone(), pieces, &self.unknowns.parameters, settings)?;
         let of = |i: usize| {
             let unknown = &problem.unknowns.row[i];
@@ -104,7 +96,7 @@ impl Problem<'_> {
         let of = |i: usize| {
             let unknown = &self.unknowns.row[i];
             let piece = unknown.experiment.map(|e| begins.iter().position(|(of, _, _)| *of == e).unwrap_or_default());
-            let same = |other: &crate::estimate::Unknown| other.role == unknown.role && other.experiment == piece;
+            let same = |other: &Unknown| other.role == unknown.role && other.experiment == piece;
             let found = parts.unknowns.iter().position(same);
             found.map_or(unknown.parameter.transform.to_coordinate(unknown.parameter.start), |i| coordinates[i])
         };
@@ -123,7 +115,7 @@ fn begins(e: usize, nodes: &[(usize, Vec<f64>)], count: usize) -> Vec<Begin> {
 /// What the pieces say of the parameters.
 fn said(parts: &Summary, pieces: &[Record]) -> String {
     let parameters = parts.unknowns.iter().filter(|unknown| matches!(unknown.role, Role::Parameter(_)));
-    let one = |unknown: &crate::estimate::Unknown| {
+    let one = |unknown: &Unknown| {
         let error =
             unknown.knowledge.standard_error().map_or_else(String::new, |error| format!(" +- {}", number(error, 2)));
         format!("`{}` = {}{error}", unknown.name, number(unknown.value, 5))

@@ -96,7 +96,7 @@ pub(super) fn shoot(
     let (mut best, mut evaluations): (Option<Shot>, u64) = (None, 0);
     for _ in 0..LENGTHS {
         let (explained, shooting, x) = aim.explained(length)?;
-        let shot = aim.shot(shooting, x, control).ok_or("the search was stopped")?;
+        let shot = aim.shot(shooting, x, control).ok_or("its first search came to no end")?;
         evaluations += shot.evaluations;
         let order = |shot: &Shot| (shot.gap > CLOSED, shot.misfit);
         if best.as_ref().is_none_or(|best| order(&shot) < order(best)) {
@@ -107,7 +107,7 @@ pub(super) fn shoot(
         }
         length = (explained / 2).max(LEAST);
     }
-    best.map(|shot| Shot { evaluations, ..shot }).ok_or("the search was stopped")
+    best.map(|shot| Shot { evaluations, ..shot }).ok_or("its first search came to no end")
 }
 
 impl<'s> Aim<'s> {
@@ -182,6 +182,9 @@ impl<'s> Aim<'s> {
             let (end, count) = minimize(&shooting, x);
             x = end;
             evaluations += count;
+            if shooting.is_stopped(&x) && !control.stops() {
+                continue;
+            }
             let passed = shooting.pass(&x).ok()?;
             let gap = passed.gaps.iter().fold(0.0, |most: f64, gap| most.max(gap.abs())) / self.part;
             let misfit = self.misfit(passed.cost);

@@ -71,6 +71,14 @@ impl<'p> Shooting<'p> {
         self.bounds = bounds.into_iter().zip(around).map(cut).collect();
     }
 
+    /// Whether a search from a point ended where a logarithm was stopped, so that it goes on from there.
+    pub fn is_stopped(&self, x: &[f64]) -> bool {
+        let coordinates = self.coordinates(x);
+        let ends = self.bounds.iter().zip(self.objective.bounds()).zip(&coordinates);
+        ends.into_iter()
+            .any(|((here, declared), x)| *x == here.0 && here.0 > declared.0 || *x == here.1 && here.1 < declared.1)
+    }
+
     /// The sample and the state of each node of each record.
     pub fn nodes(&self, x: &[f64]) -> Vec<Vec<(usize, Vec<f64>)>> {
         let node = |e: usize, k: usize| (self.pieces[e][k].start, x[self.node(e, k)].to_vec());

@@ -155,7 +155,9 @@ fn pushed(seed: u64, samples: usize, fv: f64) -> ExperimentOf<Pushed> {
     Experiment::new(&Pushed, time, inputs, outputs).unwrap()
 }
 
-const UNSTABLE: Axis<Parameter> = Axis { m: free(0.2), fv: free(-10.0), offset: free(10.0) };
+fn unstable() -> Axis<Parameter> {
+    Axis { m: free(0.2), fv: free(-10.0), offset: free(10.0) }
+}
 
 /// From a start whose simulation grows by `exp(500)`: the parameters come back within four standard errors, of one record with a hidden velocity, of
 /// two with a friction each, in a fleet as alone, and with a parameter by logarithm whose start is 475 times too small.
@@ -168,17 +170,17 @@ fn a_start_that_cannot_be_simulated_is_led_to_the_data() {
             assert!((unknown.value - truth).abs() < 4.0 * error && error < 0.05 * truth.abs(), "{truth} {found}");
         }
     };
-    let alone = Fit::new(&Pushed, &records[0]).parameters(UNSTABLE).multiple_shooting().run().unwrap();
+    let alone = Fit::new(&Pushed, &records[0]).parameters(unstable()).multiple_shooting().run().unwrap();
     near(&alone, &[95.0, 200.0, -3.0]);
-    let each = Axis { fv: free(-10.0).per_experiment(), ..UNSTABLE };
+    let each = Axis { fv: free(-10.0).per_experiment(), ..unstable() };
     let both = Fit::new(&Pushed, &records).parameters(each).multiple_shooting().run().unwrap();
     near(&both, &[95.0, -3.0, 200.0, 300.0]);
-    let logarithm = Axis { m: free(0.2).log(), ..UNSTABLE };
+    let logarithm = Axis { m: free(0.2).log(), ..unstable() };
     near(
         &Fit::new(&Pushed, &records[0]).parameters(logarithm).multiple_shooting().run().unwrap(),
         &[95.0, 200.0, -3.0],
     );
-    let fleet = Fleet::new(&Pushed).parameters(UNSTABLE).multiple_shooting().fleet().unwrap();
+    let fleet = Fleet::new(&Pushed).parameters(unstable()).multiple_shooting().fleet().unwrap();
     let together = fleet.run([records[0].clone()]).next().unwrap().unwrap();
     assert_eq!(together.evaluations, alone.evaluations);
 }
@@ -229,9 +231,9 @@ fn what_has_no_pieces_says_so() {
 fn starts_that_nobody_can_simulate_are_named() {
     let record = pushed(7, 1000, 200.0);
     let run = |start: Axis<Parameter>| Fit::new(&Pushed, &record).parameters(start).multiple_shooting().run();
-    let error = run(Axis { m: free(1e-300), ..UNSTABLE }).unwrap_err();
+    let error = run(Axis { m: free(1e-300), ..unstable() }).unwrap_err();
     assert!(matches!(error, Error::Start(_)), "{error}");
-    let error = run(Axis { m: free(5.0).within(5.0, 5.0), ..UNSTABLE }).unwrap_err();
+    let error = run(Axis { m: free(5.0).within(5.0, 5.0), ..unstable() }).unwrap_err();
     assert!(error.to_string().contains("its bounds are 5 and 5"), "{error}");
 }
 

@@ -113,6 +113,8 @@ fn what_changes_between_searches() {
     shooting.begin_at(&x);
     let bounds = shooting.bounds();
     assert_eq!(bounds[0], (x[0] - 1.5, x[0] + 1.5));
+    let at = |by: f64| [&[x[0] + by], &x[1..]].concat();
+    assert_eq!([0.0, 1.4, 1.5, -1.5].map(|by| shooting.is_stopped(&at(by))), [false, false, true, true]);
     assert!(bounds[1..].iter().all(|bound| *bound == (f64::NEG_INFINITY, f64::INFINITY)));
 }
 
