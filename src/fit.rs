@@ -6,12 +6,15 @@ mod elsewhere;
 mod fittable;
 mod fleet;
 mod lockstep;
+mod moves;
+mod pieces;
 mod predict;
 #[cfg(feature = "parallel")]
 mod prefetch;
 mod refine;
 mod run;
 mod search;
+mod shooting;
 mod simulate;
 mod simulated;
 mod staged;
@@ -33,7 +36,7 @@ use crate::optimize::LeastSquaresState;
 use crate::parameter::Parameter;
 use crate::predict::Predictor;
 use crate::prefilter::Butterworth;
-use crate::problem::{Noise, Problem, Search, SearchPlan, Settings};
+use crate::problem::{Lead, Noise, Problem, Search, SearchPlan, Settings};
 use crate::record::{Record, Time};
 use crate::weighting::Weighting;
 use argmin::core::observers::{Observe, ObserverMode};
@@ -246,7 +249,9 @@ impl<'a, M: Made> Fit<'a, M> {
     /// leaves an output unexplained: after searches from further starts that find nothing usable, in their place where records are long. After
     /// `starts(1)` it does neither. A fit that was asked for stages searches from no further starts by itself.
     ///
-    /// A start is kept where a simulation from the end of its stages is no nearer to the measurements. Stages need a model that can be read as a graph, of one to six states, an integrator of fixed steps, a
+    /// Where no simulation follows the measurements after the last stage, multiple shooting goes on from there
+    /// ([`multiple_shooting`](Fit::multiple_shooting)). A start is kept where a simulation from their end is no nearer to the measurements, nor
+    /// are the pieces near them. Stages need a model that can be read as a graph, of one to six states, an integrator of fixed steps, a
     /// simulation to be predicted ([`FreeRun`](crate::FreeRun), the default), and no pre-filter; the estimate says what came of them
     /// ([`WarningCode::Staged`](crate::WarningCode::Staged)). Their evaluations are counted, their trial steps (100 each at most) are not.
     ///
@@ -262,7 +267,41 @@ impl<'a, M: Made> Fit<'a, M> {
     /// # }
     /// ```
     pub fn staged(self) -> Self {
-        self.set(|settings| settings.staged = true)
+        self.set(|settings| settings.lead = Lead::Stages)
+    }
+
+    /// Improves each start by multiple shooting alone before the search (H. G. Bock and K. J. Plitt, IFAC Proceedings 17 (1984) 1603): the
+    /// records are cut into pieces, at first with the states of a filter, or the measured ones, at their begins. These states are unknowns, too, and an
+    /// augmented Lagrangian closes the gaps between the end of each piece and the begin of the next. A piece is so short that an error of the
+    /// parameters does not take its end far from the measurements, so that starts serve from which a simulation diverges. Time and memory are linear
+    /// in the length of the records. From the end, the fit goes on with the simulation of whole records as always, and says so
+    /// ([`WarningCode::Staged`](crate::WarningCode::Staged)), with the largest gap and the rms error of the pieces in units of the noise. Pieces whose gaps
+    /// are closed may stand at a wrong minimum: where the error is not near the noise, shorter ones are tried.
+    ///
+    /// [`staged`](Fit::staged) fits do so after their other stages. The later of the two calls counts.
+    ///
+    /// Where the pieces explain the measurements and one simulation of a whole record does not (a chaotic plant, over many times the time in which errors
+    /// double), the parameters are those of pieces as long as possible, each with an initial state of its own. The verdict is that of the
+    /// whole record, not usable; the note has the standard errors of the pieces. Fit these ([`Experiment::slice`](crate::Experiment::slice)) for a verdict
+    /// of their own.
+    ///
+    /// A start is kept where there are no pieces: a record of fewer than 16 samples, pieces of eight samples that cannot be simulated,
+    /// outputs that do not give the state where the model has no filter (it cannot be read as a graph, or has more than six states), a predictor that corrects
+    /// the state, a pre-filter. The note says so.
+    ///
+    /// ```
+    /// # use greybox::{Experiment, Fit, free, pmsm::{Surface, Winding}};
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// # let model = Surface::new(4)?;
+    /// # let record = Experiment::from_file(&model, "examples/data/pmsm.csv")?;
+    /// let start = Winding { rs: free(6.0), ls: free(4e-2), ke: free(-9.0) }; // truth: 0.63 ohm, 4 mH, 0.95 V s/rad
+    /// let estimate = Fit::new(&model, &record).parameters(start).multiple_shooting().run()?;
+    /// assert!((estimate.parameters.ls / 4e-3 - 1.0).abs() < 0.01);
+    /// # Ok(())
+    /// # }
+    /// ```
+    pub fn multiple_shooting(self) -> Self {
+        self.set(|settings| settings.lead = Lead::Shooting)
     }
 
     /// Stops the search at its best point so far when the flag is set (by another thread, a signal handler).

@@ -171,6 +171,9 @@ pub struct FitOptions {
     /// Improve each start in stages before the search: fits of predictions that are corrected less in each stage.
     #[arg(long)]
     pub staged: bool,
+    /// Improve each start by multiple shooting alone: pieces with initial states of their own, whose gaps are closed step by step.
+    #[arg(long, conflicts_with = "staged")]
+    pub multiple_shooting: bool,
     /// End after so many seconds with the best so far.
     #[arg(long, value_name = "SECONDS")]
     pub time_limit: Option<f64>,

@@ -189,6 +189,9 @@ pub fn fit<'a>(
     if options.staged {
         fit = fit.staged();
     }
+    if options.multiple_shooting {
+        fit = fit.multiple_shooting();
+    }
     if let Some(limit) = time_limit(options)? {
         fit = fit.time_limit(limit);
     }

@@ -7,7 +7,8 @@
 //! - `replica`: an axis in an open loop from a start that is unstable, each time with another record;
 //! - `emps-open`, `emps-closed`: the recorded axis (`--emps`) from starts drawn over two decades.
 //!
-//! `--starts=N` asks for so many starts of each fit, `--plain` for one search alone.
+//! `--starts=N` asks for so many starts of each fit, `--plain` for one search alone, `--staged` for stages and `--multiple-shooting` for multiple
+//! shooting before it.
 
 mod axis;
 mod lorenz;
@@ -46,7 +47,7 @@ struct Arguments {
     #[arg(long)]
     emps: Option<PathBuf>,
     /// How many starts each fit has.
-    #[arg(long, conflicts_with_all = ["plain", "staged"])]
+    #[arg(long, conflicts_with_all = ["plain", "staged", "multiple_shooting"])]
     starts: Option<usize>,
     /// One search from the declared start, and no other.
     #[arg(long)]
@@ -54,6 +55,9 @@ struct Arguments {
     /// In stages from the first search on.
     #[arg(long, conflicts_with = "plain")]
     staged: bool,
+    /// By multiple shooting alone before the first search.
+    #[arg(long, conflicts_with_all = ["plain", "staged"])]
+    multiple_shooting: bool,
     /// Prints the estimate of each fit.
     #[arg(long)]
     verbose: bool,
@@ -93,6 +97,7 @@ impl Study<'_> {
             (Some(count), _) => fit.starts(count),
             (None, true) => fit.starts(1),
             _ if self.0.staged => fit.staged(),
+            _ if self.0.multiple_shooting => fit.multiple_shooting(),
             _ => fit,
         }
     }

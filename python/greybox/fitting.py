@@ -41,6 +41,7 @@ def fit(
     optimizer: str | None = None,
     starts: int | None = None,
     staged: bool | None = None,
+    multiple_shooting: bool | None = None,
     time_limit: float | None = None,
     checkpoint: str | os.PathLike[str] | None = None,
     progress: bool = False,
@@ -91,6 +92,9 @@ def fit(
         Improve each start in stages before the search, by fits of predictions of a filter that corrects the state at each sample, in each further
         stage less: for starts from which a simulation diverges, and for chaotic or unstable plants. A fit does so by itself where its start cannot
         be simulated.
+    multiple_shooting : bool, optional
+        Improve each start by multiple shooting alone: the records in pieces with initial states of their own, whose gaps are closed step by step. A fit
+        with `staged` does so after its stages where a simulation does not follow the measurements yet; ask for one of the two.
     time_limit : float, optional
         Stop at the best point so far after this time (s).
     checkpoint : path, optional
@@ -141,6 +145,7 @@ def fit(
             "optimizer": optimizer,
             "starts": starts,
             "staged": staged,
+            "multiple_shooting": multiple_shooting,
             "time_limit": time_limit,
             "checkpoint": checkpoint,
         },

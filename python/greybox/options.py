@@ -47,6 +47,7 @@ class Options(TypedDict, total=False):
     optimizer: str | None
     starts: int | None
     staged: bool | None
+    multiple_shooting: bool | None
     time_limit: float | None
     checkpoint: str | os.PathLike[str] | None
 
@@ -60,6 +61,8 @@ def settings(equations: Equations, given: Options) -> dict[str, Any]:
         raise Error(f'noise is {noise!r}; give a standard deviation for each output, {{"name": 0.1}}, or "covariance"')
     if starts is not None and (not isinstance(starts, int) or starts < 1):
         raise Error(f"starts is {starts!r}; take a whole number of 1 or more")
+    if given.get("staged") and given.get("multiple_shooting"):
+        raise Error("staged and multiple_shooting are both asked for; take one: a staged fit shoots by itself where it helps")
     weighting, checkpoint = given.get("weighting"), given.get("checkpoint")
     names = ("loss", "prefilter", "integrator", "predictor", "optimizer")
     return {
@@ -69,6 +72,7 @@ def settings(equations: Equations, given: Options) -> dict[str, Any]:
         "weighting": None if weighting is None else of_sample(equations, weighting),
         "starts": starts,
         "staged": bool(given.get("staged")),
+        "multiple_shooting": bool(given.get("multiple_shooting")),
         "time_limit": given.get("time_limit"),
         "checkpoint": None if checkpoint is None else (os.fspath(checkpoint), 1),
         **{name: _name(name, given.get(name)) for name in names},  # type: ignore[arg-type]

@@ -126,6 +126,7 @@ pub struct Options {
     optimizer: Option<String>,
     starts: Option<usize>,
     staged: bool,
+    multiple_shooting: bool,
     time_limit: Option<f64>,
     checkpoint: Option<(PathBuf, u64)>,
 }
@@ -157,6 +158,9 @@ impl Options {
         }
         if self.staged {
             fit = fit.staged();
+        }
+        if self.multiple_shooting {
+            fit = fit.multiple_shooting();
         }
         if let Some(seconds) = self.time_limit {
             let limit = Duration::try_from_secs_f64(seconds);

@@ -117,8 +117,9 @@ pub enum WarningCode {
     Outliers,
     /// An initial state that neither the user nor the outputs give a start for.
     GuessedStart,
-    /// The search began at the end of stages ([`Fit::staged`](crate::Fit::staged)), which were asked for, or taken since the declared start
-    /// cannot be simulated; or why it did not; or a lower minimum may lie elsewhere, since a simulation from the declared start is far off and
+    /// The search began at the end of stages ([`Fit::staged`](crate::Fit::staged)) or of multiple shooting
+    /// ([`Fit::multiple_shooting`](crate::Fit::multiple_shooting)), which were asked for, or taken since the declared start cannot be simulated; or why
+    /// it did not; or the parameters are those of pieces, since no simulation of a whole record follows the measurements; or a lower minimum may lie elsewhere, since a simulation from the declared start is far off and
     /// the errors are colored.
     Staged,
     /// Time jumps within a record.

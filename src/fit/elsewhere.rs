@@ -2,10 +2,11 @@
 //! half the frequency of sampling, and from further starts and in stages where an output is left unexplained.
 
 use super::refine::{Start, is_only_coarse, is_useless};
-use super::staged::{STAGES, noted};
+use super::staged::noted;
+use super::stages::Led;
 use crate::estimate::{About, Summary, Warning, WarningCode};
 use crate::numeral::counted;
-use crate::problem::{Control, Noise, Problem, SearchPlan, Settings};
+use crate::problem::{Control, Lead, Noise, Problem, SearchPlan, Settings};
 use crate::severity::Severity;
 use std::time::{Duration, Instant};
 
@@ -58,8 +59,8 @@ pub(super) enum Further {
 /// Where further searches began.
 pub(super) enum Way {
     Starts,
-    /// At the end of so many stages.
-    Stages(u32),
+    /// At the end of stages.
+    Stages(Led),
 }
 
 impl Way {
@@ -85,9 +86,7 @@ impl Further {
             Further::Found { best, way, stopped, .. } => {
                 let began = match way {
                     Way::Starts => format!("from {STARTS} starts by itself, and went on from the best of them"),
-                    Way::Stages(count) => {
-                        format!("from the end of {} by itself ({STAGES})", counted((*count).into(), "stage"))
-                    }
+                    Way::Stages(led) => format!("by itself from the end of {}", led.path()),
                 };
                 let stopped = if *stopped { "; limits of the fit stopped searches before their end" } else { "" };
                 let better = if way.explains(best) || is_better(best, found) {
@@ -155,7 +154,7 @@ impl Problem<'_> {
             warning.code == WarningCode::Staged
                 || warning.code == WarningCode::Unexplained && warning.about == About::Search
         };
-        let single = self.settings.searches == SearchPlan::Single && !self.settings.staged;
+        let single = self.settings.searches == SearchPlan::Single && self.settings.lead == Lead::Declared;
         if !single
             || self.sweep.restarts().is_some()
             || self.sweep.predicts_variance()
@@ -200,7 +199,7 @@ impl Problem<'_> {
         if control.stops()
             || !leaves_unexplained(found)
             || self.settings.searches != SearchPlan::Single
-            || self.settings.staged
+            || self.settings.lead != Lead::Declared
             || predicted
             || hopeless.into_iter().any(|code| is_useless(found, code))
         {
@@ -215,9 +214,7 @@ impl Problem<'_> {
         let most = if self.runs_in_lanes() { LONGEST_IN_LANES } else { LONGEST };
         if self.samples() > most {
             let staged = self.searched_in_stages(begin, control);
-            return Some(
-                staged.map_or(Further::TooLong(most), |(best, led)| as_further(best, Way::Stages(led.stages))),
-            );
+            return Some(staged.map_or(Further::TooLong(most), |(best, led)| as_further(best, Way::Stages(led))));
         }
         let settings = Settings { checkpoint: None, searches: SearchPlan::Best(STARTS), ..self.settings.clone() };
         let problem = Problem { settings, finer: None, ..self.clone() };
@@ -234,7 +231,7 @@ impl Problem<'_> {
         };
         let (iterations, evaluations) = (best.iterations + again.iterations, best.evaluations + again.evaluations);
         let (best, way) = match is_found(&best, &again) {
-            true => (best, Way::Stages(led.stages)),
+            true => (best, Way::Stages(led)),
             false => (again, Way::Starts),
         };
         Some(as_further(Summary { iterations, evaluations, ..best }, way))
@@ -354,7 +351,7 @@ mod tests {
         assert!(leaves_unexplained(&alone), "{alone}");
         let found = fit().run().unwrap();
         assert!((found.parameters.sigma / 10.0 - 1.0).abs() < 1e-2, "{found}");
-        let said = found.warnings.iter().any(|warning| warning.text.contains("stages by itself"));
+        let said = found.warnings.iter().any(|warning| warning.text.contains("by itself from the end of"));
         assert!(said && found.severity() < Severity::NotUsable, "{found}");
     }
 

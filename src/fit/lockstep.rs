@@ -4,6 +4,7 @@ use super::elsewhere::{Further, with_work_of};
 use super::refine::{Attempt, Start};
 use super::search::{Rounds, at_end, ended, settled};
 use super::staged::{after_stages, noted};
+use super::stages::Led;
 use crate::covariance::SearchEnd;
 use crate::error::Error;
 use crate::estimate::Summary;
@@ -138,6 +139,7 @@ pub(super) fn fit_together(problems: &[Problem<'_>]) -> Vec<Result<Summary, Erro
     let Some(control) = problems.first().map(|first| control(first, problems.len())) else { return vec![] };
     let (starts, notes): (Vec<_>, Vec<_>) =
         each(problems.len(), |i| problems[i].first_start(&control)).into_iter().unzip();
+    let leds: Vec<Option<Led>> = starts.iter().map(|start: &Start| start.stages.clone()).collect();
     let all: Vec<From<'_>> = problems.iter().zip(starts).collect();
     let found = by_one_method(&all, &control).into_iter().zip(notes);
     let found: Vec<_> = found.map(|(found, note)| found.map(|found| noted(found, note))).collect();
@@ -189,7 +191,11 @@ pub(super) fn fit_together(problems: &[Problem<'_>]) -> Vec<Result<Summary, Erro
     let found: Vec<_> = found.into_iter().zip(failed).map(|(found, staged)| staged.map_or(found, Ok)).collect();
     let searched =
         each(found.len(), |i| problems[i].searched_elsewhere(found[i].as_ref().ok()?, further[i].as_ref(), &control));
-    found.into_iter().zip(searched).map(|(found, searched)| searched.map_or(found, Ok)).collect()
+    let found: Vec<_> = found.into_iter().zip(searched).map(|(found, searched)| searched.map_or(found, Ok)).collect();
+    let by_pieces = |((found, led), problem): ((Result<Summary, Error>, Option<Led>), &Problem<'_>)| {
+        found.map(|found| problem.or_by_pieces(found, led.as_ref(), &control))
+    };
+    found.into_iter().zip(leds).zip(problems).map(by_pieces).collect()
 }
 
 /// The stop conditions of fits together: the sum of their time limits is left to all.
@@ -281,7 +287,7 @@ fn conclude_together(
                 Some(residuals) => conclude_from(objective, end, residuals, seconds),
                 None => conclude(objective, end, seconds),
             };
-            found.map(|found| after_stages(found, starts[i].stages))
+            found.map(|found| after_stages(found, starts[i].stages.as_ref()))
         }
         _ => plain[i].problem.run_within(Instant::now(), control, starts[i].clone()),
     };

@@ -5,6 +5,7 @@ use super::predict::asked;
 use super::refine::{Attempt, Start};
 use super::search::{at_end, search, settled};
 use super::staged::{after_stages, noted};
+use super::stages::Led;
 use super::start_error::start_error;
 use super::starts::search_from_many;
 use crate::covariance::SearchEnd;
@@ -12,7 +13,7 @@ use crate::error::Error;
 use crate::estimate::Summary;
 use crate::judge::conclude;
 use crate::optimize::{Domain, LeastSquares, LevenbergMarquardt, Outcome};
-use crate::problem::{Control, Objective, Problem, SearchPlan, Settings, Simulated, Whitening, noise};
+use crate::problem::{Control, Lead, Objective, Problem, SearchPlan, Settings, Simulated, Whitening, noise};
 use crate::record::Record;
 use crate::sweep::States;
 use std::time::Instant;
@@ -34,7 +35,7 @@ impl Problem<'_> {
     /// cannot be simulated, is followed by finer ones.
     pub(super) fn run_since(&self, begin: Instant) -> Result<Summary, Error> {
         let control = self.control(begin);
-        let found = self.run_first(begin, &control);
+        let (found, led) = self.run_first(begin, &control);
         // Before finer methods, each of which takes several times as long.
         let further = found.as_ref().ok().and_then(|found| self.search_further(found, &control));
         let found = found.map(|found| with_work_of(found, further.as_ref()));
@@ -42,23 +43,28 @@ impl Problem<'_> {
             Some(usable) => usable,
             None => self.or_in_stages(self.refined(found, 0, begin, &control), &control)?,
         };
-        Ok(self.searched_elsewhere(&found, further.as_ref(), &control).unwrap_or(found))
+        let found = self.searched_elsewhere(&found, further.as_ref(), &control).unwrap_or(found);
+        Ok(self.or_by_pieces(found, led.as_ref(), &control))
     }
 
     /// The estimate from the declared start, or from the end of stages if they were asked for.
-    fn run_first(&self, begin: Instant, control: &Control) -> Result<Summary, Error> {
+    fn run_first(&self, begin: Instant, control: &Control) -> (Result<Summary, Error>, Option<Led>) {
         let (start, note) = self.first_start(control);
-        let found = match self.run_within(begin, control, start.clone()) {
+        let led = start.stages.clone();
+        (self.run_from(start, begin, control).map(|found| noted(found, note)), led)
+    }
+
+    fn run_from(&self, start: Start, begin: Instant, control: &Control) -> Result<Summary, Error> {
+        match self.run_within(begin, control, start.clone()) {
             // Stages that were stopped leave no time to evaluate their end, which is the best point so far.
-            Err(_) if self.settings.staged && control.stops() => {
+            Err(_) if self.settings.lead != Lead::Declared && control.stops() => {
                 let settings = Settings { searches: SearchPlan::Single, ..self.settings.clone() };
                 let problem = Problem { settings, ..self.clone() };
                 let found = problem.run_within(begin, &NEVER, Start { trials: 1, ..start })?;
-                Summary { outcome: control.named(Outcome::Cancelled), ..found }
+                Ok(Summary { outcome: control.named(Outcome::Cancelled), ..found })
             }
-            found => found?,
-        };
-        Ok(noted(found, note))
+            found => found,
+        }
     }
 
     /// The estimate by a method, numbered as in [`by_method`](Self::by_method), or by a finer one, as long as a finer step would
@@ -97,7 +103,7 @@ impl Problem<'_> {
         };
         let end = settled(&plain, end);
         let found = conclude(&at_end(&plain, &end), &end, begin.elapsed().as_secs_f64())?;
-        Ok(after_stages(found, start.stages))
+        Ok(after_stages(found, start.stages.as_ref()))
     }
 
     /// The stop conditions of a run that began then: flag and time limit.
@@ -122,6 +128,11 @@ impl Problem<'_> {
     /// # Errors
     /// A point of another length, or one that cannot be simulated.
     pub fn estimate(&self, coordinates: &[f64]) -> Result<Summary, Error> {
+        self.estimate_at(coordinates, "search by argmin")
+    }
+
+    /// The estimate at a point that this has found.
+    pub(super) fn estimate_at(&self, coordinates: &[f64], by: &str) -> Result<Summary, Error> {
         let begin = Instant::now();
         let expected = self.unknowns.row.len();
         if coordinates.len() != expected {
@@ -144,7 +155,7 @@ impl Problem<'_> {
             outcome,
             iterations: 0,
             evaluations: 1,
-            name: "search by argmin".to_owned(),
+            name: by.to_owned(),
             write_error: None,
             memory: objective.memory.clone(),
             starts: None,

@@ -5,37 +5,29 @@ use super::refine::{Start, is_only_coarse};
 use super::stages::Led;
 use crate::error::Error;
 use crate::estimate::{About, Summary, Warning, WarningCode};
-use crate::numeral::counted;
-use crate::problem::{Control, Problem, SearchPlan, Settings};
+use crate::problem::{Control, Lead, Problem, SearchPlan, Settings};
 use crate::severity::Severity;
 use std::time::Instant;
-
-/// What the stages are, in words.
-pub(super) const STAGES: &str = "predictions by a filter that corrects the state at each sample, less in each stage";
 
 impl Problem<'_> {
     /// Where the search begins, and a note of the stages, if they were asked for.
     pub(super) fn first_start(&self, control: &Control) -> (Start, Option<Warning>) {
         let declared = Start::declared(self);
-        if !self.settings.staged {
+        if self.settings.lead == Lead::Declared {
             return (declared, None);
         }
-        let (start, text) = match self.stages() {
-            Err(reason) => (declared, format!("stages were asked for, but there are none: {reason}")),
-            Ok(_) if self.settings.searches.count() > 1 => (
-                declared,
-                format!("each search began at the end of stages ({STAGES}), if that is nearer to the measurements"),
-            ),
-            Ok(stages) => match stages.declared(control) {
-                Some((start, led)) => {
-                    let count = counted(led.stages.into(), "stage");
-                    (start, format!("the search began at the end of {count} ({STAGES})"))
-                }
-                None => {
-                    let text = "stages were asked for, but their end is no nearer to the measurements than the declared start, where the \
-                                search began";
-                    (declared, text.to_owned())
-                }
+        let (asked, none, its) = match self.settings.lead {
+            Lead::Shooting => ("multiple shooting was asked for", "there is none", "its"),
+            _ => ("stages were asked for", "there are none", "their"),
+        };
+        let (start, text) = match self.stages().map(|stages| (self.settings.searches.count() > 1, stages)) {
+            Err(reason) => (declared, format!("{asked}, but {none}: {reason}")),
+            Ok((true, _)) => {
+                (declared, format!("{asked}: each search began at {its} end, if that is nearer to the measurements"))
+            }
+            Ok((false, stages)) => match stages.declared(control) {
+                Ok((start, led)) => (start, format!("the search began at the end of {}", led.path())),
+                Err(reason) => (declared, format!("{asked}, but {reason}; the search began at the declared start")),
             },
         };
         (start, Some(note(text)))
@@ -49,15 +41,13 @@ impl Problem<'_> {
     /// The estimate from the end of stages, with a note, where a fit failed because its declared start cannot be simulated; `None` where the
     /// stages fail, too, and of other errors.
     pub(super) fn in_stages(&self, error: &Error, control: &Control) -> Option<Summary> {
-        let single = self.settings.searches == SearchPlan::Single && !self.settings.staged;
+        let single = self.settings.searches == SearchPlan::Single && self.settings.lead == Lead::Declared;
         if !(single && matches!(error, Error::Start(_))) {
             return None;
         }
         let (mut found, led) = self.searched_in_stages(Instant::now(), control)?;
-        let count = counted(led.stages.into(), "stage");
-        let text = format!(
-            "the declared start cannot be simulated, so that the search began at the end of {count} ({STAGES})"
-        );
+        let path = led.path();
+        let text = format!("the declared start cannot be simulated, so that the search began at the end of {path}");
         found.warnings.push(note(text));
         Some(found)
     }
@@ -67,7 +57,7 @@ impl Problem<'_> {
         // A checkpoint is that of the search before.
         let settings = Settings { checkpoint: None, ..self.settings.clone() };
         let problem = Problem { settings, ..self.clone() };
-        let (start, led) = problem.stages().ok()?.declared(control)?;
+        let (start, led) = problem.stages().ok()?.declared(control).ok()?;
         let mut found = problem.run_within(begin, control, start).ok()?;
         if is_only_coarse(&found) {
             found = problem.refined(Ok(found), 0, begin, control).ok()?;
@@ -82,15 +72,16 @@ pub(super) fn noted(mut found: Summary, note: Option<Warning>) -> Summary {
     found
 }
 
-fn note(text: String) -> Warning {
+pub(super) fn note(text: String) -> Warning {
     Warning::new(WarningCode::Staged, Severity::Usable, text).about(About::Search)
 }
 
 /// An estimate with the evaluations of the stages before it, if there were any, and a note where a simulation from their end leaves the measurements.
-pub(super) fn after_stages(found: Summary, led: Option<Led>) -> Summary {
+pub(super) fn after_stages(found: Summary, led: Option<&Led>) -> Summary {
     let Some(led) = led else { return found };
     let mut found = Summary { evaluations: found.evaluations + led.evaluations, ..found };
-    if !led.follows && leaves_unexplained(&found) {
+    let explained = led.follows || led.shot.as_ref().is_some_and(|shot| shot.explains());
+    if led.stages > 0 && !explained && leaves_unexplained(&found) {
         let text = "predictions of a filter that corrects the state at each sample follow the measurements where this search began, and a simulation \
                     does not: the plant may be unstable, chaotic or disturbed; take Kalman, with Model::diffusion and Model::noise";
         found.warnings.push(note(text.to_owned()));

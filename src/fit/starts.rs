@@ -13,7 +13,7 @@ use crate::error::{Error, Failure};
 use crate::estimate::Starts;
 use crate::numeral::number;
 use crate::optimize::{Infeasible, LeastSquares, Linearization};
-use crate::problem::{At, CheckpointFile, Objective, Optimizer, SearchPlan, each, linearize_together, noise};
+use crate::problem::{At, CheckpointFile, Lead, Objective, Optimizer, SearchPlan, each, linearize_together, noise};
 use minima::{Comparison, End};
 use progress::{Places, Progress};
 use serde::{Deserialize, Serialize};
@@ -114,12 +114,13 @@ pub(super) fn search_from_many(
 
 /// Where stages lead these starts, if they were asked for, and their evaluations.
 fn in_stages(plain: &Objective<'_>, starts: &[Vec<f64>]) -> (Vec<Vec<f64>>, u64) {
-    let Some(stages) = plain.problem.settings.staged.then(|| plain.problem.stages().ok()).flatten() else {
+    let Some(stages) = (plain.problem.settings.lead != Lead::Declared).then(|| plain.problem.stages().ok()).flatten()
+    else {
         return (starts.to_vec(), 0);
     };
     let led = each(starts.len(), |i| stages.lead(&starts[i], plain.control));
     let evaluations = led.iter().flatten().map(|(_, led)| led.evaluations).sum();
-    let places = led.into_iter().zip(starts).map(|(led, start)| led.map_or_else(|| start.clone(), |(led, _)| led));
+    let places = led.into_iter().zip(starts).map(|(led, start)| led.map_or_else(|_| start.clone(), |(led, _)| led));
     (places.collect(), evaluations)
 }
 

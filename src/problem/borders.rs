@@ -75,14 +75,20 @@ impl Objective<'_> {
             if !self.problem.cuts.is_chained(e) {
                 return Ok(vec![]);
             }
-            let job = self.job(e, &values[e], coordinates, false);
             let at: Vec<usize> = segments[1..].iter().map(|samples| samples.start).collect();
-            let found = self.sweep.follow(&job.piece, &at).map_err(|error| self.infeasible(e, error))?;
+            let found = self.carries(e, coordinates, &at)?;
             Ok(found.into_iter().map(|carry| Reached { carry, slopes: vec![] }).collect())
         };
         let of: Result<Vec<_>, Infeasible> = each(self.experiments(), one).into_iter().collect();
         let (point, cost, values) = (coordinates.to_vec(), f64::INFINITY, values.to_vec());
         Ok(Borders { point, cost, values, of: of?, right: true, run_ins: None })
+    }
+
+    /// The carries at these samples of an experiment, run from its begin.
+    pub(crate) fn carries(&self, e: usize, coordinates: &[f64], at: &[usize]) -> Result<Vec<Vec<f64>>, Infeasible> {
+        let values = self.problem.unknowns.of_experiment(e, coordinates);
+        let job = self.job(e, &values, coordinates, false);
+        self.sweep.follow(&job.piece, at).map_err(|error| self.infeasible(e, error))
     }
 
     /// The carry at the begin of each segment.

@@ -45,8 +45,19 @@ pub(crate) struct Settings {
     pub(crate) checkpoint: Option<(PathBuf, u64)>,
     pub(crate) optimizer: Arc<dyn Optimizer>,
     pub(crate) searches: SearchPlan,
-    /// Whether each start is led to the data in stages first.
-    pub(crate) staged: bool,
+    /// What leads each start to the data before the search.
+    pub(crate) lead: Lead,
+}
+
+/// Fits of an easier cost before the search of a simulation.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Lead {
+    /// Nothing, unless the start cannot be simulated or explains nothing.
+    Declared,
+    /// Predictions by a filter, less corrected in each stage, then multiple shooting.
+    Stages,
+    /// Multiple shooting alone.
+    Shooting,
 }
 
 /// From where a fit searches.
@@ -92,7 +103,7 @@ impl Default for Settings {
             checkpoint: None,
             optimizer: Arc::new(<LevenbergMarquardt>::default()),
             searches: SearchPlan::Single,
-            staged: false,
+            lead: Lead::Declared,
         }
     }
 }

@@ -46,6 +46,7 @@ mod segments;
 mod sensors;
 #[path = "../common/shared.rs"]
 mod shared;
+mod shooting;
 #[path = "../common/spiral.rs"]
 mod spiral;
 mod stages;

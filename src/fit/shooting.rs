@@ -1,0 +1,236 @@
+//! Multiple shooting for far starts: the records in pieces that begin near the measurements, and continuity asked for step by step.
+
+use super::moves::{Movement, NEAR};
+use crate::numeral::number;
+use crate::optimize::{Domain, LeastSquares, LevenbergMarquardt, Machine, OwnSize, Request, Stop};
+use crate::problem::{Control, Objective, Problem, Shooting, Whitening};
+use crate::record::Record;
+use std::fmt;
+
+/// The least noise of an output that pieces are compared with, as a part of half its range.
+const LEAST_NOISE: f64 = 0.01;
+/// The least samples of a piece.
+const LEAST: usize = 8;
+/// The first pieces are the longest ones, in halvings, whose error from the start is at most this part of half the range: with shorter ones, the
+/// measurements of a piece say less of the parameters.
+const EXPLAINED: f64 = 0.5;
+/// Pieces of half the length follow where an end is not near the noise; so many lengths are tried.
+const LENGTHS: usize = 4;
+/// A search with fixed multipliers ends where the next step would lower the cost by this part. Multipliers that change before, or a penalty that rises,
+/// lead to other minima.
+const INNER: Stop = Stop { step: 1e-10, gradient: 1e-8, cost: 1e-4, iterations: 500 };
+/// The most searches.
+const ROUNDS: usize = 40;
+/// The penalty rises where the largest gap did not shrink to this part; after so many searches in which it did not, rounding is what is left.
+const SHRUNK: f64 = 0.25;
+const STUCK: usize = 6;
+/// The last search is the one after which the largest gap is at most this part of the noise: a chaotic plant makes gaps larger by a factor of 1e8.
+const LAST: f64 = 1e-9;
+/// Continuity is closed where the largest gap is at most this part of the noise, and pieces explain the measurements where their error is at most so many
+/// times the noise.
+const CLOSED: f64 = 1e-3;
+const EXPLAINS: f64 = 1.5;
+
+/// The end of multiple shooting.
+pub(super) struct Shot {
+    pub coordinates: Vec<f64>,
+    /// The samples at which the nodes of each record stand, and their states.
+    pub nodes: Vec<Vec<(usize, Vec<f64>)>>,
+    pub pieces: usize,
+    pub evaluations: u64,
+    /// The largest gap, in units of the noise.
+    pub gap: f64,
+    /// The root of the mean square error of the pieces, in units of the noise.
+    pub misfit: f64,
+}
+
+impl Shot {
+    /// Whether continuity is closed and the errors are near the noise: a wrong minimum may be closed, too.
+    pub fn explains(&self) -> bool {
+        self.gap <= CLOSED && self.misfit <= EXPLAINS
+    }
+}
+
+impl fmt::Display for Shot {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let (pieces, gap, misfit) = (self.pieces, number(self.gap, 1), number(self.misfit, 2));
+        write!(
+            f,
+            "multiple shooting ({pieces} pieces; in units of the noise, the largest gap is {gap} and the rms error {misfit})"
+        )
+    }
+}
+
+/// What does not change with the length of the pieces.
+struct Aim<'s> {
+    objective: Objective<'s>,
+    /// By which nodes are found, if there is a filter.
+    filter: Option<Objective<'s>>,
+    start: &'s [f64],
+    sizes: Vec<f64>,
+    /// The noise as a part of half the range, the largest of all outputs.
+    part: f64,
+    /// Pieces with a larger misfit explain nothing.
+    unexplained: f64,
+    /// The number of measurements.
+    rows: usize,
+}
+
+/// Multiple shooting from a start. The nodes are at first the states of a filter that is near the measurements, or the measured states.
+///
+/// # Errors
+/// Why there are no pieces that can be run.
+pub(super) fn shoot(
+    (problem, movement, filter): (&Problem<'_>, &Movement, Option<&Problem<'_>>),
+    start: &[f64],
+    control: &Control,
+) -> Result<Shot, &'static str> {
+    let longest = problem.records.iter().map(Record::len).max().unwrap_or(0);
+    if longest < 2 * LEAST {
+        return Err("no record has two pieces of eight samples");
+    }
+    let filter = filter.map(|filter| filter.in_units(control));
+    let aim = Aim::new(problem, movement, filter, start, control).ok_or("the outputs are undefined at the start")?;
+    let length = (movement.rate * movement.step).recip() as usize;
+    let mut length = length.clamp(LEAST, longest / 2);
+    let (mut best, mut evaluations): (Option<Shot>, u64) = (None, 0);
+    for _ in 0..LENGTHS {
+        let (explained, shooting, x) = aim.explained(length)?;
+        let shot = aim.shot(shooting, x, control).ok_or("its first search came to no end")?;
+        evaluations += shot.evaluations;
+        let order = |shot: &Shot| (shot.gap > CLOSED, shot.misfit);
+        if best.as_ref().is_none_or(|best| order(&shot) < order(best)) {
+            best = Some(shot);
+        }
+        if best.as_ref().is_some_and(Shot::explains) || explained == LEAST || control.stops() {
+            break;
+        }
+        length = (explained / 2).max(LEAST);
+    }
+    best.map(|shot| Shot { evaluations, ..shot }).ok_or("its first search came to no end")
+}
+
+impl<'s> Aim<'s> {
+    fn new(
+        problem: &'s Problem<'s>,
+        movement: &Movement,
+        filter: Option<Objective<'s>>,
+        start: &'s [f64],
+        control: &'s Control,
+    ) -> Option<Self> {
+        let positive = |value: f64| if value > 0.0 { value } else { 1.0 };
+        let noise = movement.outputs.iter().map(|moves| moves.noise.max(LEAST_NOISE * moves.half));
+        let sigma: Vec<f64> = noise.map(positive).collect();
+        let parts = movement.outputs.iter().zip(&sigma).filter(|(moves, _)| moves.half > 0.0);
+        let part = parts.clone().map(|(moves, sigma)| sigma / moves.half).fold(0.0, f64::max);
+        let squares = parts.clone().map(|(moves, sigma)| (moves.half / sigma).powi(2)).sum::<f64>();
+        let unexplained = EXPLAINED * (squares / parts.count() as f64).sqrt();
+        let sizes = problem.scales(problem.records.first()?, movement.rate)?.into_iter().map(positive).collect();
+        let outputs = problem.records.iter().flat_map(Record::outputs);
+        let rows = outputs.map(|output| output.values.iter().filter(|y| !y.is_nan()).count()).sum();
+        let objective = problem.in_units(control).with(Whitening::Diagonal(sigma));
+        Some(Aim { objective, filter, start, sizes, part, unexplained, rows })
+    }
+
+    /// The root of the mean square error of the pieces.
+    fn misfit(&self, cost: f64) -> f64 {
+        (2.0 * cost / self.rows.max(1) as f64).sqrt()
+    }
+
+    /// Pieces that explain the outputs at the start, of at most so many samples, or the shortest ones.
+    fn explained(&self, mut length: usize) -> Result<(usize, Shooting<'_>, Vec<f64>), &'static str> {
+        loop {
+            let penalty = self.part.powi(-2);
+            let shooting = Shooting::new(&self.objective, length, self.sizes.clone(), penalty);
+            let nodes = (0..self.objective.experiments()).map(|e| self.nodes(e, &shooting.nodes_at(e)));
+            let nodes: Vec<Vec<Vec<f64>>> = nodes.collect::<Result<_, _>>()?;
+            let x = shooting.point(self.start, &nodes);
+            let misfit = shooting.pass(&x).map_or(f64::INFINITY, |passed| self.misfit(passed.cost));
+            if misfit <= self.unexplained || misfit.is_finite() && length <= LEAST {
+                return Ok((length, shooting, x));
+            }
+            if length <= LEAST {
+                return Err(
+                    "pieces of eight samples cannot be simulated from the start; bound the parameters, or start elsewhere",
+                );
+            }
+            length = (length / 2).max(LEAST);
+        }
+    }
+
+    /// The states of a record at some samples.
+    fn nodes(&self, e: usize, at: &[usize]) -> Result<Vec<Vec<f64>>, &'static str> {
+        let states = self.sizes.len();
+        if let Some(filter) = &self.filter {
+            let mut nodes = filter.carries(e, self.start, at).map_err(|_| "a filter fails from the start")?;
+            nodes.iter_mut().for_each(|node| node.truncate(states));
+            return Ok(nodes);
+        }
+        let (sweep, record) = (self.objective.sweep, &self.objective.problem.records[e]);
+        let p = self.objective.problem.unknowns.of_experiment(e, self.start).p;
+        let measured = |k: &usize| sweep.measured_state(record, *k, &p);
+        let all: Result<Vec<Vec<f64>>, String> = at.iter().map(measured).collect();
+        all.map_err(|_| "outputs do not give the state where pieces begin, and the model is not compiled, so that there is no filter")
+    }
+
+    /// The end of multiple shooting with these pieces.
+    fn shot(&self, mut shooting: Shooting<'_>, mut x: Vec<f64>, control: &Control) -> Option<Shot> {
+        let (mut evaluations, mut before, mut shot) = (0, f64::INFINITY, None);
+        let (mut least, mut stuck) = (f64::INFINITY, 0);
+        for _ in 0..ROUNDS {
+            shooting.begin_at(&x);
+            let (end, count) = minimize(&shooting, x);
+            x = end;
+            evaluations += count;
+            if shooting.is_stopped(&x) && !control.stops() {
+                continue;
+            }
+            let passed = shooting.pass(&x).ok()?;
+            let gap = passed.gaps.iter().fold(0.0, |most: f64, gap| most.max(gap.abs())) / self.part;
+            let misfit = self.misfit(passed.cost);
+            let coordinates = shooting.coordinates(&x);
+            // A search for parameters that explain pieces without continuity has not come near the noise.
+            let lost = count > INNER.iterations && misfit > NEAR;
+            shot = Some(Shot {
+                coordinates,
+                nodes: shooting.nodes(&x),
+                pieces: shooting.count(),
+                evaluations,
+                gap,
+                misfit,
+            });
+            if gap <= SHRUNK * least {
+                (least, stuck) = (gap, 0);
+            } else {
+                stuck += 1;
+            }
+            if gap <= LAST || lost || stuck >= STUCK || control.stops() {
+                break;
+            }
+            shooting.tighten(&passed.gaps, gap <= SHRUNK * before);
+            before = gap;
+        }
+        shot
+    }
+}
+
+/// The end of a search for the least cost with fixed multipliers, and its evaluations.
+fn minimize(shooting: &Shooting<'_>, start: Vec<f64>) -> (Vec<f64>, u64) {
+    let mut search = LevenbergMarquardt::new(INNER, OwnSize);
+    search.begin(start, Domain::of(shooting));
+    let mut evaluations = 0;
+    loop {
+        match search.request() {
+            Request::Linearize(x) => {
+                let answer = shooting.linearize(x);
+                evaluations += 1;
+                search.tell(answer);
+            }
+            Request::Curvature { x, along } => {
+                let answer = shooting.curvature(x, along);
+                search.tell_curvature(answer);
+            }
+            Request::Ended(_) => return (search.place().to_vec(), evaluations),
+        }
+    }
+}
