@@ -189,8 +189,8 @@ impl Problem<'_> {
         Some(Summary { seconds: found.seconds + begin.elapsed().as_secs_f64(), ..best })
     }
 
-    /// Searches from further starts where an estimate leaves an output unexplained, and in stages where these find nothing usable or records are
-    /// long. They run by the default method; the best minimum goes on by finer ones where only the step is wrong with it. `None` where stages or
+    /// Further searches where an estimate leaves an output unexplained: by multiple shooting, from further starts where the errors of that are not
+    /// near the noise, and in stages where these find nothing usable or records are long. They run by the default method; the best minimum goes on by finer ones where only the step is wrong with it. `None` where stages or
     /// a number of starts were asked for, where the measurements tell nothing by any parameters, and where the variance is predicted: that
     /// likelihood has no bound at noise levels of zero, which some start would find.
     pub(super) fn search_further(&self, found: &Summary, control: &Control) -> Option<Further> {
@@ -215,6 +215,11 @@ impl Problem<'_> {
         if self.samples() > most {
             let staged = self.searched_in_stages(begin, control);
             return Some(staged.map_or(Further::TooLong(most), |(best, led)| as_further(best, Way::Stages(led))));
+        }
+        if let Some((best, led)) =
+            self.searched_by_shooting(begin, control).filter(|(best, _)| !leaves_unexplained(best))
+        {
+            return Some(as_further(best, Way::Stages(led)));
         }
         let settings = Settings { checkpoint: None, searches: SearchPlan::Best(STARTS), ..self.settings.clone() };
         let problem = Problem { settings, finer: None, ..self.clone() };
