@@ -54,7 +54,7 @@ impl<S: Scalar> Transition<S> {
         let short = if halvings <= LONGEST { h * (-halvings).exp2() } else { S::from(f64::NAN) };
         let ah: Vec<S> = a.iter().map(|a| *a * short).collect();
         let (mut power, mut added) = (ah.clone(), ah.clone());
-        let first = |k: usize| move |at: usize| S::from(f64::from(u8::from(at % (n + 1) == 0)) / k as f64);
+        let first = |k: usize| move |at: usize| S::from(f64::from(u8::from(at.is_multiple_of(n + 1))) / k as f64);
         let (mut constant, mut ramp): (Vec<S>, Vec<S>) =
             ((0..n * n).map(first(1)).collect(), (0..n * n).map(first(2)).collect());
         let mut term: Vec<S> = q.iter().map(|q| *q * short).collect();
@@ -133,7 +133,7 @@ impl<S: Scalar> Transition<S> {
     fn double(&mut self) {
         let Transition { n, length, added, constant, ramp, covariance } = self;
         let n = *n;
-        *length = *length * 2.0;
+        *length *= 2.0;
         let (of_constant, of_ramp) = (product(n, added, constant), product(n, constant, constant));
         ramp.iter_mut().zip(of_ramp).for_each(|(ramp, square)| *ramp += square / *length);
         constant.iter_mut().zip(of_constant).for_each(|(constant, moved)| *constant = *constant * 2.0 + moved);

@@ -217,7 +217,7 @@ mod tests {
         let [x, y, z] = [0, 1, 2].map(|i| graph.leaf(Leaf::State(i)));
         let [a, b, c, d, e, q] = [0, 1, 2, 3, 4, 5].map(|j| graph.leaf(Leaf::Parameter(j)));
         let u = graph.leaf(Leaf::Input(0));
-        let mut sum = |graph: &mut Graph, terms: [(Id, Id); 2]| {
+        let sum = |graph: &mut Graph, terms: [(Id, Id); 2]| {
             let [first, second] = terms.map(|(p, x)| graph.mul(p, x));
             graph.sub(second, first)
         };

@@ -132,12 +132,11 @@ impl Pattern {
         all.extend(seeds.iter().map(|seed| tape.leaf(leaf(seed))));
         all.extend(following.iter().map(|one| tape.leaf(Leaf::Parameter(one.number))));
         let influence = forward::influence(tape, &all, next);
-        let follows = |i: usize, s: usize| {
+        let by_parameters = |i: usize, s: usize, seed: &Seed| {
+            let itself = matches!(seed, Seed::Parameter(_)) && influence[i][n + s];
             let mut moving = following.iter().zip(&influence[i][n + seeds.len()..]);
-            moving.any(|(one, reaches)| *reaches && one.slope(&seeds[s]).is_some())
+            itself || moving.any(|(one, reaches)| *reaches && one.slope(seed).is_some())
         };
-        let parameter =
-            |i: usize, s: usize| matches!(seeds[s], Seed::Parameter(_)) && influence[i][n + s] || follows(i, s);
         let mut there: Vec<Vec<bool>> = (0..n)
             .map(|i| seeds.iter().map(|seed| *seed == Seed::Carry(i) || starts(i, leaf(seed))).collect())
             .collect();
@@ -145,8 +144,8 @@ impl Pattern {
         while grew {
             grew = false;
             for i in 0..n {
-                for s in 0..seeds.len() {
-                    let reached = parameter(i, s) || (0..n).any(|j| influence[i][j] && there[j][s]);
+                for (s, seed) in seeds.iter().enumerate() {
+                    let reached = by_parameters(i, s, seed) || (0..n).any(|j| influence[i][j] && there[j][s]);
                     if reached && !there[i][s] {
                         (there[i][s], grew) = (true, true);
                     }
