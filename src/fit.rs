@@ -246,7 +246,8 @@ impl<'a, M: Made> Fit<'a, M> {
     /// many minima.
     ///
     /// A fit goes in stages without being asked where the declared start cannot be simulated by any of its methods. It does so, too, where its search
-    /// leaves an output unexplained: after searches from further starts that find nothing usable, in their place where records are long. After
+    /// leaves an output unexplained: after [`multiple_shooting`](Fit::multiple_shooting), which is taken where its errors are near the noise, and searches
+    /// from further starts that find nothing usable; in place of both where records are long. After
     /// `starts(1)` it does neither. A fit that was asked for stages searches from no further starts by itself.
     ///
     /// Where no simulation follows the measurements after the last stage, multiple shooting goes on from there
