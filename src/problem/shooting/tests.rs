@@ -121,6 +121,6 @@ fn what_changes_between_searches() {
 #[test]
 fn pieces_cover_a_record() {
     assert_eq!(cut(10, 4), [0..5, 5..10]);
-    assert_eq!(cut(3, 8), [0..3]);
+    assert_eq!(cut(3, 8), std::iter::once(0..3).collect::<Vec<_>>());
     assert_eq!(cut(3, 0), [0..1, 1..2, 2..3]);
 }
