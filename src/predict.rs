@@ -149,7 +149,7 @@ pub(crate) trait Prediction: Debug + Send + Sync {
     /// Whether it predicts a variance by the model's process noise, as far as is known.
     fn takes_diffusion(&self) -> bool;
     fn starts_from(&self) -> StartsFrom;
-    /// Numbers that a plant in symbols has after its parameters: programs of filters that differ in them are one.
+    /// Settings that a program reads after the parameters, so that filters which differ in these alone share it.
     fn numbers(&self) -> Vec<f64>;
     /// This predictor to the second order, of a filter of first order.
     fn second_order(&self) -> Option<Arc<dyn Prediction>>;

@@ -147,6 +147,14 @@ impl<S: Scalar> Transition<S> {
     }
 }
 
+/// The covariance of independent noises with these levels, row by row.
+pub(crate) fn squares<S: Scalar>(levels: &[S]) -> Vec<S> {
+    let n = levels.len();
+    let mut square = vec![S::from(0.0); n * n];
+    square.iter_mut().step_by(n + 1).zip(levels).for_each(|(square, level)| *square = *level * *level);
+    square
+}
+
 fn product<S: Scalar>(n: usize, a: &[S], b: &[S]) -> Vec<S> {
     (0..n * n).map(|at| (0..n).map(|k| a[at / n * n + k] * b[k * n + at % n]).sum()).collect()
 }

@@ -6,7 +6,7 @@ use crate::dual::Dual;
 use crate::graph::{Following, Graph, Id, Leaf, Node};
 use crate::layout::Kind;
 use crate::scalar::Scalar;
-use crate::transition::{Crossing, Transition};
+use crate::transition::{Crossing, Transition, squares};
 
 /// Slopes of a pass.
 const SLOPES: usize = 8;
@@ -29,6 +29,17 @@ enum Part {
     Constant,
     Ramp,
     Covariance,
+}
+
+impl Part {
+    fn of<S>(self, crossing: &mut Crossing<S>) -> &mut [Option<S>] {
+        match self {
+            Part::Kept => &mut crossing.kept,
+            Part::Constant => &mut crossing.constant,
+            Part::Ramp => &mut crossing.ramp,
+            Part::Covariance => &mut crossing.covariance,
+        }
+    }
 }
 
 /// An entry of a matrix that is not always zero.
@@ -126,13 +137,7 @@ impl Linear {
         let mut crossing =
             Crossing { n: self.states, kept: none(), constant: none(), ramp: none(), covariance: none() };
         for entry in &self.entries {
-            let part = match entry.part {
-                Part::Kept => &mut crossing.kept,
-                Part::Constant => &mut crossing.constant,
-                Part::Ramp => &mut crossing.ramp,
-                Part::Covariance => &mut crossing.covariance,
-            };
-            part[entry.at] = Some(number(&entry.following));
+            entry.part.of(&mut crossing)[entry.at] = Some(number(&entry.following));
         }
         crossing
     }
@@ -150,15 +155,9 @@ impl Linear {
             };
             let p: Vec<Dual<SLOPES>> =
                 parameters.iter().enumerate().map(|(j, p)| Dual::variable(*p, lane(j))).collect();
-            let crossing = self.transition(&p, h).crossing();
+            let mut crossing = self.transition(&p, h).crossing();
             for Entry { part, at, following } in &self.entries {
-                let of = match part {
-                    Part::Kept => &crossing.kept,
-                    Part::Constant => &crossing.constant,
-                    Part::Ramp => &crossing.ramp,
-                    Part::Covariance => &crossing.covariance,
-                };
-                let Some(found) = of[*at] else { continue };
+                let Some(found) = part.of(&mut crossing)[*at] else { continue };
                 let first = following.number as usize;
                 numbers[first] = found.value;
                 for (to, j) in numbers[first + 1..].iter_mut().zip(&following.moves) {
@@ -174,12 +173,9 @@ impl Linear {
     fn transition<S: Scalar>(&self, p: &[S], h: f64) -> Transition<S> {
         let n = self.states;
         let a = evaluate(&self.a.graph, &self.a.entries, None, p);
-        let mut q = vec![S::from(0.0); n * n];
-        if let Some((graph, roots)) = &self.diffusion {
-            let levels = evaluate(graph, roots, None, p);
-            q.iter_mut().step_by(n + 1).zip(levels).for_each(|(q, level)| *q = level * level);
-        }
-        Transition::over(n, &a, &q, S::from(h))
+        let levels = self.diffusion.as_ref().map(|(graph, roots)| evaluate(graph, roots, None, p));
+        let levels = levels.unwrap_or_else(|| vec![S::from(0.0); n]);
+        Transition::over(n, &a, &squares(&levels), S::from(h))
     }
 }
 

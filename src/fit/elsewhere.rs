@@ -190,8 +190,8 @@ impl Problem<'_> {
     }
 
     /// Further searches where an estimate leaves an output unexplained: by multiple shooting, from further starts where the errors of that are not
-    /// near the noise, and in stages where these find nothing usable or records are long. They run by the default method; the best minimum goes on by finer ones where only the step is wrong with it. `None` where stages or
-    /// a number of starts were asked for, where the measurements tell nothing by any parameters, and where the variance is predicted: that
+    /// near the noise, and in stages where these find nothing usable or records are long. They run by the default method; the best minimum goes on by
+    /// finer ones where only the step is wrong with it. `None` where stages or a number of starts were asked for, where the measurements tell nothing by any parameters, and where the variance is predicted: that
     /// likelihood has no bound at noise levels of zero, which some start would find.
     pub(super) fn search_further(&self, found: &Summary, control: &Control) -> Option<Further> {
         let hopeless = [WarningCode::ConstantOutput, WarningCode::TooFewMeasurements];

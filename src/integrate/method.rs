@@ -1,6 +1,6 @@
 //! [`Method`]: an integrator whose type is not known, for systems whose number of states is known at run time only.
 
-use super::exact::Exact;
+use super::exact::{Exact, STEPS};
 use super::{Automatic, Integrator, Rk4, Square, Stiff, Stuck, System};
 use crate::dual::Dual;
 use crate::error::Error;
@@ -137,10 +137,6 @@ pub(crate) trait Method: Debug + Send + Sync {
     fn is_exact(&self) -> bool {
         false
     }
-    /// The method for equations that are not linear, of one that is exact.
-    fn otherwise(&self) -> Option<Arc<dyn Method>> {
-        None
-    }
     /// This method with a finer step, if there is one.
     fn refined(&self, kind: Kind) -> Option<Arc<dyn Method>>;
     /// Refuses models of a kind that the method does not serve, and settings that make no sense.
@@ -193,6 +189,11 @@ impl<I: Integrator> Method for I {
 #[inline(never)]
 pub(crate) fn automatic(substeps: u32) -> Arc<dyn Method> {
     Arc::new(Automatic { continuous: Rk4 { substeps } })
+}
+
+/// The method for other equations beside those that this one serves: steps, where it is exact.
+pub(crate) fn stepped(method: &Arc<dyn Method>) -> Arc<dyn Method> {
+    if method.is_exact() { automatic(STEPS) } else { method.clone() }
 }
 
 /// The default method of filters of linear equations with constant coefficients.

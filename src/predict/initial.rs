@@ -4,7 +4,7 @@ use super::{Plant, Unstable};
 use crate::layout::Kind;
 use crate::moments::entry;
 use crate::scalar::Scalar;
-use crate::transition::{Restless, Transition};
+use crate::transition::{Restless, Transition, squares};
 use serde::{Deserialize, Serialize};
 
 /// The covariance of the state at the first sample, about the initial state that the fit estimates or is given, for
@@ -40,10 +40,9 @@ impl InitialCovariance {
     pub(super) fn at<S: Scalar>(self, plant: &dyn Plant<S>, x: &[S]) -> Result<Vec<S>, Unstable> {
         let (n, kind) = (x.len(), plant.layout().kind);
         let diagonal = |fill: &dyn Fn(&mut [S])| {
-            let (mut levels, mut square) = (vec![S::from(0.0); n], vec![S::from(0.0); n * n]);
+            let mut levels = vec![S::from(0.0); n];
             fill(&mut levels);
-            square.iter_mut().step_by(n + 1).zip(levels).for_each(|(square, level)| *square = level * level);
-            square
+            squares(&levels)
         };
         let upper = |square: Vec<S>| {
             let mut triangle = vec![S::from(0.0); n * (n + 1) / 2];

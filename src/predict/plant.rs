@@ -8,7 +8,7 @@ use crate::interval::Hold;
 use crate::layout::{Kind, Layout};
 use crate::record::{Part, Record};
 use crate::scalar::Scalar;
-use crate::transition::{Crossing, Transition};
+use crate::transition::{Crossing, Transition, squares};
 use core::cell::{Cell, RefCell};
 use std::rc::Rc;
 
@@ -57,8 +57,9 @@ pub trait Plant<S> {
     /// Where the integrator is [`Stuck`].
     fn integrate(&self, z: &mut [S], rate: Rate<'_, S>) -> Result<(), Stuck>;
 
-    /// Of a plant whose equations are linear, where the fit takes them from sample to sample exactly: replaces the covariance of the state at this
-    /// sample, upper triangle row by row, by that at the next. False of others, whose covariance is to be [integrated](Plant::integrate).
+    /// Replaces the covariance of the state at this sample (upper triangle row by row, each entry in the product of its two states' units) by that at
+    /// the next, the process noise of the interval included, and returns true, where equations are linear with constant coefficients and no
+    /// integrator was chosen. Else it returns false, and the covariance is to be [integrated](Plant::integrate).
     fn spread(&self, covariance: &mut [S]) -> bool {
         let _ = covariance;
         false
@@ -148,7 +149,7 @@ pub(crate) struct SlicePlant<'a, S> {
     pub intervals: &'a Intervals<S>,
 }
 
-/// What is kept from interval to interval.
+/// What is kept of an interval for the next ones.
 pub(crate) struct Intervals<S> {
     /// The step of an adaptive integrator.
     pub step: Cell<f64>,
@@ -198,11 +199,10 @@ impl<S: Stepped> SlicePlant<'_, S> {
             return Some(known.clone());
         }
         let none = vec![S::from(0.0); n];
-        let (mut a, mut q, mut levels) = (vec![S::from(0.0); n * n], vec![S::from(0.0); n * n], none.clone());
+        let (mut a, mut levels) = (vec![S::from(0.0); n * n], none.clone());
         self.state_slopes(0.0, &none, &mut a);
         self.diffusion(0.0, &none, &mut levels);
-        q.iter_mut().step_by(n + 1).zip(levels).for_each(|(q, level)| *q = level * level);
-        let made = Rc::new(Transition::over(n, &a, &q, S::from(length)).crossing());
+        let made = Rc::new(Transition::over(n, &a, &squares(&levels), S::from(length)).crossing());
         let mut kept = self.intervals.crossings.borrow_mut();
         kept.truncate(LENGTHS - 1);
         kept.insert(0, (length, made.clone()));
@@ -261,13 +261,7 @@ impl<S: Stepped> Plant<S> for SlicePlant<'_, S> {
     fn next(&self, x: &mut [S]) -> Result<(), Stuck> {
         let (state, _) = x.split_at_mut(self.layout.states.len());
         if let Some(crossing) = self.crossing() {
-            let at = |position: f64| {
-                let mut rate = state.to_vec();
-                self.derivative(position, state, &mut rate);
-                rate
-            };
-            let end = self.between.u1.is_some().then(|| at(1.0));
-            crossing.state(state, &at(0.0), end.as_deref());
+            crossing.state(state, self.between.u1.is_some(), |position, x, to| self.derivative(position, x, to));
             return Ok(());
         }
         let p: Vec<Duals> = self.p.iter().map(|p| Dual::constant(p.value())).collect();

@@ -106,13 +106,7 @@ impl<'a> SymbolicInterval<'a> {
     /// The state at the next sample.
     pub fn next(&self, x: &mut [Symbol]) {
         if let Some(crossing) = self.crossing() {
-            let at = |position: f64| {
-                let mut rate = x.to_vec();
-                self.rate(position, x, &mut rate);
-                rate
-            };
-            let end = (!self.holds.all_zero()).then(|| at(1.0));
-            return crossing.state(x, &at(0.0), end.as_deref());
+            return crossing.state(x, !self.holds.all_zero(), |position, x, to| self.rate(position, x, to));
         }
         let kind = self.equations.layout().kind;
         self.cross(kind, x, &|position, x, to| self.rate(position, x, to));

@@ -11,7 +11,7 @@ use crate::equations::WithTerms;
 use crate::error::{Error, Failure};
 use crate::functions::delays;
 use crate::graph::Choices;
-use crate::integrate::Method;
+use crate::integrate::{Method, stepped};
 use crate::layout::{Kind, Layout};
 use crate::predict::{FreeRun, Guess, Place, Prediction};
 use crate::record::{Channel, Initial, Record};
@@ -208,7 +208,7 @@ impl Sweep for DualSweep<'_> {
     fn with_terms<'s>(&'s self) -> Option<Lacking<'s>> {
         let WithTerms { equations, terms, left_out } = self.code.equations()?.with_terms();
         let (layout, code) = (Arc::new(equations.layout().clone()), Arc::new(Evaluated::new(Arc::new(equations))));
-        let method = self.method.otherwise().unwrap_or_else(|| self.method.clone());
+        let method = stepped(&self.method);
         let predictor = self.predictor.clone();
         let sweep = DualSweep { layout, code, method, predictor, uncompiled: self.uncompiled.clone() };
         Some(Lacking { sweep: Arc::new(sweep), terms, left_out })

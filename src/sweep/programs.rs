@@ -15,7 +15,7 @@ use crate::engine::{Program, Sampling, Trajectories};
 use crate::equations::{Equations, WithTerms};
 use crate::error::{Error, Failure};
 use crate::graph::Untraceable;
-use crate::integrate::Method;
+use crate::integrate::{Method, stepped};
 use crate::interval::Hold;
 use crate::layout::{Kind, Layout};
 use crate::predict::{FreeRun, GivenNoise, Guess, Prediction, numbers, recurrence};
@@ -324,7 +324,7 @@ impl Sweep for ProgramSweep<'_> {
         let equations = &self.programs.equations;
         let predictor: Arc<dyn Prediction> = Arc::new(noise.clone());
         predictor.check(equations.layout()).ok()?;
-        let method = self.programs.method.otherwise().unwrap_or_else(|| self.programs.method.clone());
+        let method = stepped(&self.programs.method);
         let plain = of_equations_in_duals(equations, &method, &predictor);
         let numbers = numbers(equations, &*predictor);
         let make = || Programs::new(equations.clone(), method, predictor).ok().map(Arc::new);
@@ -339,7 +339,7 @@ impl Sweep for ProgramSweep<'_> {
     fn with_terms<'s>(&'s self) -> Option<Lacking<'s>> {
         let make = || {
             let WithTerms { equations, terms, left_out } = self.programs.equations.with_terms();
-            let method = self.programs.method.otherwise().unwrap_or_else(|| self.programs.method.clone());
+            let method = stepped(&self.programs.method);
             let sweep = of_equations(&Arc::new(equations), &method, &self.programs.predictor).ok()?;
             Some(Lacking { sweep, terms, left_out })
         };

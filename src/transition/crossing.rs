@@ -24,11 +24,20 @@ impl<S: Scalar> Crossing<S> {
         products.into_iter()
     }
 
-    /// The state at the end, from `A x + b` with the state at the begin and the `b` at the begin and at the end, if that is another.
-    pub fn state(&self, x: &mut [S], begin: &[S], end: Option<&[S]>) {
-        let change: Option<Vec<S>> = end.map(|end| end.iter().zip(begin).map(|(end, begin)| *end - *begin).collect());
+    /// Replaces the state at the begin by that at the end. `rate(position, x, to)` writes `A x + b` at a fraction of the interval; `b` grows along it
+    /// in proportion to time where inputs are `interpolated`, else it is constant.
+    pub fn state(&self, x: &mut [S], interpolated: bool, rate: impl Fn(f64, &[S], &mut [S])) {
+        let at = |position: f64| {
+            let mut found = x.to_vec();
+            rate(position, x, &mut found);
+            found
+        };
+        let begin = at(0.0);
+        let grown = interpolated.then(|| at(1.0));
+        let change: Option<Vec<S>> =
+            grown.map(|end| end.iter().zip(&begin).map(|(end, begin)| *end - *begin).collect());
         for (i, x) in x.iter_mut().enumerate() {
-            let constant = self.times(i, &self.constant, begin);
+            let constant = self.times(i, &self.constant, &begin);
             let ramp = change.iter().flat_map(|change| self.times(i, &self.ramp, change));
             *x = constant.chain(ramp).fold(*x, |sum, term| sum + term);
         }

@@ -1,19 +1,12 @@
 //! Fits that begin at the end of multiple shooting ([`Fit::multiple_shooting`]).
 
 use crate::common::Noise;
+use crate::stages::{Axis, Constants, First, Flow, Force, Lorenz as Hidden, Motion, Position, Pushed};
 use greybox::optimize::Outcome;
 use greybox::*;
 use std::time::Duration;
 
-signals! { pub struct Flow { x: "1", y: "1", z: "1" } }
-signals! { pub struct First { x: "1" } }
-signals! { pub struct Constants { sigma: "1/s", rho: "1", beta: "1/s" } }
-
-/// E. N. Lorenz, *Deterministic nonperiodic flow*, Journal of the Atmospheric Sciences 20 (1963) 130-141.
-fn flow<S: Scalar>(x: &Flow<S>, p: &Constants<S>) -> Flow<S> {
-    Flow { x: p.sigma * (x.y - x.x), y: x.x * (p.rho - x.z) - x.y, z: x.x * x.y - p.beta * x.z }
-}
-
+/// The flow of [`Hidden`], of which all states are measured.
 #[derive(Clone)]
 struct Lorenz;
 
@@ -23,31 +16,12 @@ impl Model for Lorenz {
     type Output = Flow;
     type Parameters = Constants;
 
-    fn derivative<S: Scalar>(&self, _t: S, x: &Flow<S>, _u: &Nothing, p: &Constants<S>) -> Flow<S> {
-        flow(x, p)
+    fn derivative<S: Scalar>(&self, t: S, x: &Flow<S>, u: &Nothing, p: &Constants<S>) -> Flow<S> {
+        Hidden.derivative(t, x, u, p)
     }
 
     fn output<S: Scalar>(&self, _t: S, x: &Flow<S>, _u: &Nothing, _p: &Constants<S>) -> Flow<S> {
         *x
-    }
-}
-
-/// The same, of which `x` alone is measured.
-#[derive(Clone)]
-struct Hidden;
-
-impl Model for Hidden {
-    type State = Flow;
-    type Input = Nothing;
-    type Output = First;
-    type Parameters = Constants;
-
-    fn derivative<S: Scalar>(&self, _t: S, x: &Flow<S>, _u: &Nothing, p: &Constants<S>) -> Flow<S> {
-        flow(x, p)
-    }
-
-    fn output<S: Scalar>(&self, _t: S, x: &Flow<S>, _u: &Nothing, _p: &Constants<S>) -> First<S> {
-        First { x: x.x }
     }
 }
 
@@ -119,30 +93,6 @@ fn stages_end_with_multiple_shooting() {
     let found = Fit::new(&Lorenz, &record).parameters(off()).integrator(STEPS).staged().run().unwrap();
     assert!((found.parameters.rho / 28.0 - 1.0).abs() < 2e-3, "{found}");
     assert!(said(&found).contains("less in each stage), then of multiple shooting ("), "{found}");
-}
-
-signals! { pub struct Motion { q: "m", v: "m/s" } }
-signals! { pub struct Force { f: "N" } }
-signals! { pub struct Position { q: "m" } }
-signals! { pub struct Axis { m: "kg", fv: "N s/m", offset: "N" } }
-
-/// `m dv/dt = f - fv v - offset`, of which the position is measured.
-#[derive(Clone)]
-struct Pushed;
-
-impl Model for Pushed {
-    type State = Motion;
-    type Input = Force;
-    type Output = Position;
-    type Parameters = Axis;
-
-    fn derivative<S: Scalar>(&self, _t: S, x: &Motion<S>, u: &Force<S>, p: &Axis<S>) -> Motion<S> {
-        Motion { q: x.v, v: (u.f - p.fv * x.v - p.offset) / p.m }
-    }
-
-    fn output<S: Scalar>(&self, _t: S, x: &Motion<S>, _u: &Force<S>, _p: &Axis<S>) -> Position<S> {
-        Position { q: x.q }
-    }
 }
 
 fn pushed(seed: u64, samples: usize, fv: f64) -> ExperimentOf<Pushed> {

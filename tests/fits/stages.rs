@@ -13,7 +13,7 @@ signals! { pub struct Constants { sigma: "1/s", rho: "1", beta: "1/s" } }
 
 /// E. N. Lorenz, *Deterministic nonperiodic flow*, Journal of the Atmospheric Sciences 20 (1963) 130-141, of which `x` alone is measured.
 #[derive(Clone)]
-struct Lorenz;
+pub struct Lorenz;
 
 impl Model for Lorenz {
     type State = Flow;
@@ -62,7 +62,7 @@ signals! { pub struct Axis { m: "kg", fv: "N s/m", offset: "N" } }
 
 /// `m dv/dt = f - fv v - offset`, of which the position is measured.
 #[derive(Clone)]
-struct Pushed;
+pub struct Pushed;
 
 impl Model for Pushed {
     type State = Motion;

@@ -83,7 +83,8 @@ impl Shooting<'_> {
     /// The triangle of a piece after the first: its columns are those of its node, then of its border; and the cost of the gaps before it.
     fn triangle(&self, x: &[f64], (e, k): (usize, usize), frame: &Frame<'_>, of: (&Part, &Part)) -> (f64, Information) {
         let (before, part) = of;
-        let columns: Vec<usize> = self.node(e, k).chain(self.border(e, k, frame)).collect();
+        let border = self.border(e, k, frame);
+        let columns: Vec<usize> = self.node(e, k).chain(border.iter().copied()).collect();
         let place = |number: usize| columns.iter().position(|column| *column == number).unwrap_or_default();
         let places = |of: Vec<usize>| of.into_iter().map(place).collect::<Vec<usize>>();
         let seeds = places(self.node(e, k).chain(frame.parameters.iter().copied()).collect());
@@ -94,12 +95,9 @@ impl Shooting<'_> {
             seeds.iter().enumerate().for_each(|(j, at)| row[*at] = part.triangle.at(i, j));
             triangle.absorb_row(&row, part.triangle.at(i, seeds.len()));
         }
-        // The columns of the piece before.
-        let (numbers, scales): (Vec<usize>, &[f64]) = match k {
-            1 => (frame.numbers.clone(), &frame.first.scales),
-            _ => (self.node(e, k - 1).chain(frame.parameters.iter().copied()).collect(), &frame.scales),
-        };
-        let (numbers, root, node) = (places(numbers), self.penalty.sqrt(), &x[self.node(e, k)]);
+        // The columns of the piece before are the border.
+        let scales: &[f64] = if k == 1 { &frame.first.scales } else { &frame.scales };
+        let (numbers, root, node) = (places(border), self.penalty.sqrt(), &x[self.node(e, k)]);
         let multipliers = &self.multipliers[self.first_gap(e, k)..];
         let mut cost = 0.0;
         for (i, (gap, multiplier)) in self.gaps(before, node).zip(multipliers).enumerate() {
@@ -121,7 +119,7 @@ impl Shooting<'_> {
         (before + k - 1) * self.sizes.len()
     }
 
-    /// The unknowns that a piece depends on, besides its node.
+    /// The unknowns that a piece depends on, besides its node: those of the piece before, in the order of its columns.
     fn border(&self, e: usize, k: usize, frame: &Frame<'_>) -> Vec<usize> {
         match k {
             1 => frame.numbers.clone(),
