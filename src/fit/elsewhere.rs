@@ -64,6 +64,11 @@ pub(super) enum Way {
 }
 
 impl Way {
+    /// Whether what led there is near the noise.
+    fn is_near(&self) -> bool {
+        matches!(self, Way::Stages(led) if led.explains())
+    }
+
     /// Whether stages led to an estimate that explains all outputs. It is taken also where its search has not converged, as is common on the
     /// rough cost of a chaotic plant.
     fn explains(&self, best: &Summary) -> bool {
@@ -189,10 +194,10 @@ impl Problem<'_> {
         Some(Summary { seconds: found.seconds + begin.elapsed().as_secs_f64(), ..best })
     }
 
-    /// Further searches where an estimate leaves an output unexplained: by multiple shooting, from further starts where the errors of that are not
-    /// near the noise, and in stages where these find nothing usable or records are long. They run by the default method; the best minimum goes on by
-    /// finer ones where only the step is wrong with it. `None` where stages or a number of starts were asked for, where the measurements tell nothing by any parameters, and where the variance is predicted: that
-    /// likelihood has no bound at noise levels of zero, which some start would find.
+    /// Further searches where an estimate leaves an output unexplained: in stages, and from further starts where the errors of the stages are not
+    /// near the noise, unless records are long. They run by the default method; the best minimum goes on by finer ones where only the step
+    /// is wrong with it. `None` where stages or a number of starts were asked for, where the measurements tell nothing by any parameters, and
+    /// where the variance is predicted: that likelihood has no bound at noise levels of zero, which some start would find.
     pub(super) fn search_further(&self, found: &Summary, control: &Control) -> Option<Further> {
         let hopeless = [WarningCode::ConstantOutput, WarningCode::TooFewMeasurements];
         let predicted = self.settings.noise == Noise::Predicted;
@@ -207,39 +212,39 @@ impl Problem<'_> {
         }
         let trials = Trials::of(FROM_A_START, found.iterations, self.settings.optimizer.most())?.most;
         let begin = Instant::now();
-        let as_further = |best: Summary, way: Way| {
+        let further = |(best, way): (Summary, Way)| {
             let (best, stopped, time) = (Box::new(best), control.stops(), begin.elapsed());
             Further::Found { best, way, stopped, time }
         };
+        let staged = self.searched_in_stages(begin, control).map(|(best, led)| (best, Way::Stages(led)));
         let most = if self.runs_in_lanes() { LONGEST_IN_LANES } else { LONGEST };
-        if self.samples() > most {
-            let staged = self.searched_in_stages(begin, control);
-            return Some(staged.map_or(Further::TooLong(most), |(best, led)| as_further(best, Way::Stages(led))));
+        let explains = staged.as_ref().is_some_and(|(best, way)| way.is_near() && !leaves_unexplained(best));
+        if explains || self.samples() > most {
+            return Some(staged.map_or(Further::TooLong(most), further));
         }
-        if let Some((best, led)) =
-            self.searched_by_shooting(begin, control).filter(|(best, _)| !leaves_unexplained(best))
-        {
-            return Some(as_further(best, Way::Stages(led)));
+        let again = self.searched_from_starts(trials, begin, control).map(|best| (best, Way::Starts));
+        match (staged, again) {
+            (Some(staged), Some(again)) => {
+                let work = [&staged.0, &again.0];
+                let iterations = work.map(|found| found.iterations).iter().sum();
+                let evaluations = work.map(|found| found.evaluations).iter().sum();
+                let (best, way) = if is_found(&staged.0, &again.0) { staged } else { again };
+                Some(further((Summary { iterations, evaluations, ..best }, way)))
+            }
+            (staged, again) => staged.or(again).map(further),
         }
+    }
+
+    /// The best minimum from further starts, by finer methods where only the step is wrong with it.
+    fn searched_from_starts(&self, trials: u64, begin: Instant, control: &Control) -> Option<Summary> {
         let settings = Settings { checkpoint: None, searches: SearchPlan::Best(STARTS), ..self.settings.clone() };
         let problem = Problem { settings, finer: None, ..self.clone() };
         let start = Start { trials, ..Start::declared(&problem) };
-        let mut again = problem.run_within(begin, control, start).ok()?;
-        if is_only_coarse(&again) {
-            again = self.refined(Ok(again), 0, begin, control).ok()?;
+        let again = problem.run_within(begin, control, start).ok()?;
+        match is_only_coarse(&again) {
+            true => self.refined(Ok(again), 0, begin, control).ok(),
+            false => Some(again),
         }
-        if again.severity() < Severity::NotUsable || control.stops() {
-            return Some(as_further(again, Way::Starts));
-        }
-        let Some((best, led)) = self.searched_in_stages(begin, control) else {
-            return Some(as_further(again, Way::Starts));
-        };
-        let (iterations, evaluations) = (best.iterations + again.iterations, best.evaluations + again.evaluations);
-        let (best, way) = match is_found(&best, &again) {
-            true => (best, Way::Stages(led)),
-            false => (again, Way::Starts),
-        };
-        Some(as_further(Summary { iterations, evaluations, ..best }, way))
     }
 
     /// Whether several pieces of records like the first one run together in vector registers.
@@ -256,12 +261,14 @@ pub(super) fn leaves_unexplained(found: &Summary) -> bool {
     found.severity() == Severity::NotUsable && found.warnings.iter().any(unexplained)
 }
 
-/// Whether the estimate from the end of stages replaces that of further starts, which is not usable: it is usable, or explains all outputs where the
-/// other does not or has errors of twice the size. A smaller difference may come from the step of the integrator.
+/// Whether the estimate from the end of stages replaces that of further starts: that is not usable, and it is usable, or explains all outputs where the
+/// other does not or has errors of half the size. A smaller difference may come from the step of the integrator.
 fn is_found(staged: &Summary, again: &Summary) -> bool {
     let halved = 4f64.ln() * staged.measurements as f64;
     let lower = || staged.deviance.zip(again.deviance).is_some_and(|(staged, again)| staged < again - halved);
-    staged.severity() < Severity::NotUsable || !leaves_unexplained(staged) && (leaves_unexplained(again) || lower())
+    again.severity() == Severity::NotUsable
+        && (staged.severity() < Severity::NotUsable
+            || !leaves_unexplained(staged) && (leaves_unexplained(again) || lower()))
 }
 
 /// Whether further searches found a better estimate: one that explains all outputs, or one of no higher deviance. The first search had more

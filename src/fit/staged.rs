@@ -54,30 +54,11 @@ impl Problem<'_> {
 
     /// The estimate from the end of stages, and these; `None` where they lead nowhere.
     pub(super) fn searched_in_stages(&self, begin: Instant, control: &Control) -> Option<(Summary, Led)> {
-        self.searched_by(Lead::Stages, &|_| true, begin, control)
-    }
-
-    /// The estimate from the end of multiple shooting, where that closes the gaps and its errors are near the noise.
-    pub(super) fn searched_by_shooting(&self, begin: Instant, control: &Control) -> Option<(Summary, Led)> {
-        let explains = |led: &Led| led.shot.as_ref().is_some_and(|shot| shot.explains());
-        self.searched_by(Lead::Shooting, &explains, begin, control)
-    }
-
-    fn searched_by(
-        &self,
-        lead: Lead,
-        accepts: &dyn Fn(&Led) -> bool,
-        begin: Instant,
-        control: &Control,
-    ) -> Option<(Summary, Led)> {
         // A checkpoint is that of the search before.
         let settings = Settings { checkpoint: None, ..self.settings.clone() };
-        let leading = Problem { settings: Settings { lead, ..settings.clone() }, ..self.clone() };
+        let leading = Problem { settings: Settings { lead: Lead::Stages, ..settings.clone() }, ..self.clone() };
         let (start, led) = leading.stages().ok()?.declared(control).ok()?;
         let problem = Problem { settings, ..self.clone() };
-        if !accepts(&led) {
-            return None;
-        }
         let mut found = problem.run_within(begin, control, start).ok()?;
         if is_only_coarse(&found) {
             found = problem.refined(Ok(found), 0, begin, control).ok()?;
