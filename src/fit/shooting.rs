@@ -17,8 +17,10 @@ const EXPLAINED: f64 = 0.5;
 /// Pieces of half the length follow where an end is not near the noise; so many lengths are tried.
 const LENGTHS: usize = 4;
 /// A search with fixed multipliers ends where the next step would lower the cost by this part. Multipliers that change before, or a penalty that rises,
-/// lead to other minima.
-const INNER: Stop = Stop { step: 1e-10, gradient: 1e-8, cost: 1e-4, iterations: 500 };
+/// lead to other minima. It is made in parts of so many trial steps, up to some, as long as the pieces explain something: those that end right have taken
+/// most of the way by then.
+const INNER: Stop = Stop { step: 1e-10, gradient: 1e-8, cost: 1e-4, iterations: 100 };
+const PARTS: usize = 5;
 /// The most searches.
 const ROUNDS: usize = 40;
 /// The penalty rises where the largest gap did not shrink to this part; after so many searches in which it did not, rounding is what is left.
@@ -173,15 +175,30 @@ impl<'s> Aim<'s> {
         all.map_err(|_| "outputs do not give the state where pieces begin, and the model is not compiled, so that there is no filter")
     }
 
+    /// Moves to the least cost with fixed multipliers, and tells whether a limit of trial steps ended that.
+    fn minimized(&self, shooting: &mut Shooting<'_>, x: &mut Vec<f64>, evaluations: &mut u64) -> bool {
+        for _ in 0..PARTS {
+            shooting.begin_at(x);
+            let (end, count) = minimize(shooting, std::mem::take(x));
+            *x = end;
+            *evaluations += count;
+            if count <= INNER.iterations {
+                return false;
+            }
+            let explains = |cost: f64| self.misfit(cost) <= self.unexplained;
+            if !shooting.pass(x).is_ok_and(|passed| explains(passed.cost)) {
+                break;
+            }
+        }
+        true
+    }
+
     /// The end of multiple shooting with these pieces.
     fn shot(&self, mut shooting: Shooting<'_>, mut x: Vec<f64>, control: &Control) -> Option<Shot> {
         let (mut evaluations, mut before, mut shot) = (0, f64::INFINITY, None);
         let (mut least, mut stuck) = (f64::INFINITY, 0);
         for _ in 0..ROUNDS {
-            shooting.begin_at(&x);
-            let (end, count) = minimize(&shooting, x);
-            x = end;
-            evaluations += count;
+            let limited = self.minimized(&mut shooting, &mut x, &mut evaluations);
             if shooting.is_stopped(&x) && !control.stops() {
                 continue;
             }
@@ -190,7 +207,7 @@ impl<'s> Aim<'s> {
             let misfit = self.misfit(passed.cost);
             let coordinates = shooting.coordinates(&x);
             // A search for parameters that explain pieces without continuity has not come near the noise.
-            let lost = count > INNER.iterations && misfit > NEAR;
+            let lost = limited && misfit > NEAR;
             shot = Some(Shot {
                 coordinates,
                 nodes: shooting.nodes(&x),
