@@ -222,6 +222,9 @@ impl Problem<'_> {
         if explains || self.samples() > most {
             return Some(staged.map_or(Further::TooLong(most), further));
         }
+        if control.stops() {
+            return staged.map(further);
+        }
         let again = self.searched_from_starts(trials, begin, control).map(|best| (best, Way::Starts));
         match (staged, again) {
             (Some(staged), Some(again)) => {

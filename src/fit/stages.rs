@@ -215,8 +215,8 @@ impl Stages<'_> {
         }
     }
 
-    /// The end of the stages from a start, of which the first one has this memory (s). The last stage is the first one after which a simulation follows the measurements as well as the predictions do, one that does not explain them,
-    /// or the one before a stage that fails.
+    /// The end of the stages from a start, of which the first one has this memory (s). The last stage is the first one after which a simulation follows
+    /// the measurements as well as the predictions do, one that does not explain them, or the one before a stage that fails.
     fn lead_from(&self, start: &[f64], mut memory: f64, control: &Control) -> (Vec<f64>, Led) {
         let (mut coordinates, mut led) = (start.to_vec(), Led::default());
         for stage in 1..=MOST {
