@@ -95,6 +95,36 @@ fn stages_end_with_multiple_shooting() {
     assert!(said(&found).contains("less in each stage), then of multiple shooting ("), "{found}");
 }
 
+/// The flow with equations that are not read as a graph, so that there is no filter.
+#[derive(Clone)]
+struct Unread;
+
+impl Model for Unread {
+    type State = Flow;
+    type Input = Nothing;
+    type Output = Flow;
+    type Parameters = Constants;
+
+    fn derivative<S: Scalar>(&self, t: S, x: &Flow<S>, u: &Nothing, p: &Constants<S>) -> Flow<S> {
+        Hidden.derivative(t + 0.0 * x.x.value().floor(), x, u, p)
+    }
+
+    fn output<S: Scalar>(&self, _t: S, x: &Flow<S>, _u: &Nothing, _p: &Constants<S>) -> Flow<S> {
+        *x
+    }
+}
+
+/// Without a filter, multiple shooting is all there is of the stages.
+#[test]
+fn stages_without_a_filter_are_multiple_shooting() {
+    let record = lorenz(6);
+    let outputs = record.outputs().collect();
+    let record = Experiment::new(&Unread, record.times().clone(), vec![Nothing; record.len()], outputs).unwrap();
+    let found = Fit::new(&Unread, &record).parameters(off()).integrator(STEPS).staged().run().unwrap();
+    assert!((found.parameters.rho / 28.0 - 1.0).abs() < 0.01, "{found}");
+    assert!(said(&found).contains("the search began at the end of multiple shooting ("), "{found}");
+}
+
 fn pushed(seed: u64, samples: usize, fv: f64) -> ExperimentOf<Pushed> {
     let mut random = Noise(seed);
     let inputs: Vec<Force> = (0..samples).map(|k| Force { f: if k / 130 % 2 == 0 { 40.0 } else { -40.0 } }).collect();
