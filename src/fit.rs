@@ -246,15 +246,15 @@ impl<'a, M: Made> Fit<'a, M> {
     /// many minima.
     ///
     /// A fit goes in stages without being asked where the declared start cannot be simulated by any of its methods. It does so, too, where its search
-    /// leaves an output unexplained: it searches from further starts after that only if the errors at the end of the stages are not near the noise,
-    /// and records are not long. After `starts(1)` it does neither. A fit that was asked for stages searches from no further starts by itself.
+    /// leaves an output unexplained: it searches from further starts after that only if the errors of the minimum that the stages lead to are above
+    /// 1.5 times the noise, and records are not long. After `starts(1)` it does neither. A fit that was asked for stages searches from no further starts by itself.
     ///
     /// Where no simulation follows the measurements after the last stage, multiple shooting goes on from there
     /// ([`multiple_shooting`](Fit::multiple_shooting)). A start is kept where a simulation from their end is no nearer to the measurements, nor
     /// are the pieces near them. Stages need a simulation to be predicted ([`FreeRun`](crate::FreeRun), the default), and no pre-filter; where the
-    /// model cannot be read as a graph, has more than six states, or its integrator chooses its steps, multiple shooting is all there is. The estimate says
-    /// what came of them
-    /// ([`WarningCode::Staged`](crate::WarningCode::Staged)). Their evaluations are counted, their trial steps (100 each at most) are not.
+    /// model cannot be read as a graph, has more than six states, or its integrator chooses its steps, they are multiple shooting alone. The estimate says
+    /// what came of them ([`WarningCode::Staged`](crate::WarningCode::Staged)). Their evaluations are counted, their trial steps (100 each at most)
+    /// are not.
     ///
     /// ```
     /// # use greybox::{Experiment, Fit, free, pmsm::{Surface, Winding}};

@@ -1,10 +1,11 @@
 //! Searches that a fit runs by itself after its estimate was judged, since another minimum may be the right one: on the other side of
 //! half the frequency of sampling, and from further starts and in stages where an output is left unexplained.
 
+use super::moves::{EXPLAINS, Moves};
 use super::refine::{Start, is_only_coarse, is_useless};
 use super::staged::noted;
 use super::stages::Led;
-use crate::estimate::{About, Summary, Warning, WarningCode};
+use crate::estimate::{About, OutputEstimate, Summary, Warning, WarningCode};
 use crate::numeral::counted;
 use crate::problem::{Control, Lead, Noise, Problem, SearchPlan, Settings};
 use crate::severity::Severity;
@@ -64,11 +65,6 @@ pub(super) enum Way {
 }
 
 impl Way {
-    /// Whether what led there is near the noise.
-    fn is_near(&self) -> bool {
-        matches!(self, Way::Stages(led) if led.explains())
-    }
-
     /// Whether stages led to an estimate that explains all outputs. It is taken also where its search has not converged, as is common on the
     /// rough cost of a chaotic plant.
     fn explains(&self, best: &Summary) -> bool {
@@ -194,8 +190,8 @@ impl Problem<'_> {
         Some(Summary { seconds: found.seconds + begin.elapsed().as_secs_f64(), ..best })
     }
 
-    /// Further searches where an estimate leaves an output unexplained: in stages, and from further starts where the errors of the stages are not
-    /// near the noise, unless records are long. They run by the default method; the best minimum goes on by finer ones where only the step
+    /// Further searches where an estimate leaves an output unexplained: in stages, and from further starts where the errors of the minimum that the
+    /// stages lead to are not near the noise, unless records are long. They run by the default method; the best minimum goes on by finer ones where only the step
     /// is wrong with it. `None` where stages or a number of starts were asked for, where the measurements tell nothing by any parameters, and
     /// where the variance is predicted: that likelihood has no bound at noise levels of zero, which some start would find.
     pub(super) fn search_further(&self, found: &Summary, control: &Control) -> Option<Further> {
@@ -218,11 +214,11 @@ impl Problem<'_> {
         };
         let staged = self.searched_in_stages(begin, control).map(|(best, led)| (best, Way::Stages(led)));
         let most = if self.runs_in_lanes() { LONGEST_IN_LANES } else { LONGEST };
-        let explains = staged.as_ref().is_some_and(|(best, way)| way.is_near() && !leaves_unexplained(best));
-        if explains || self.samples() > most {
+        if self.samples() > most {
             return Some(staged.map_or(Further::TooLong(most), further));
         }
-        if control.stops() {
+        let explains = |best: &Summary| !leaves_unexplained(best) && self.is_near_noise(best);
+        if control.stops() || staged.as_ref().is_some_and(|(best, _)| explains(best)) {
             return staged.map(further);
         }
         let again = self.searched_from_starts(trials, begin, control).map(|best| (best, Way::Starts));
@@ -236,6 +232,12 @@ impl Problem<'_> {
             }
             (staged, again) => staged.or(again).map(further),
         }
+    }
+
+    /// Whether the errors of an estimate are near the noise of the measurements, those of each output.
+    fn is_near_noise(&self, found: &Summary) -> bool {
+        let near = |(output, moves): (&OutputEstimate, &Moves)| output.fit.rmse <= EXPLAINS * moves.level();
+        self.movement().is_ok_and(|movement| found.outputs.iter().zip(&movement.outputs).all(near))
     }
 
     /// The best minimum from further starts, by finer methods where only the step is wrong with it.

@@ -5,6 +5,10 @@ use crate::record::{Channel, Record};
 
 /// The least noise of an output, as a part of half its range.
 pub(super) const LEAST_NOISE: f64 = 1e-6;
+/// The least noise of an output that errors of a model are compared with, as a part of half its range.
+const LEAST_ERROR: f64 = 0.01;
+/// Errors are near the noise where their root mean square is at most so many times the noise.
+pub(super) const EXPLAINS: f64 = 1.5;
 /// Predictions are near the measurements where their error is at most so many times the noise. If those from the start are not, the first memory is
 /// shorter.
 pub(super) const NEAR: f64 = 5.0;
@@ -57,6 +61,11 @@ pub(super) struct Moves {
 }
 
 impl Moves {
+    /// The noise that errors of a model are compared with.
+    pub fn level(&self) -> f64 {
+        self.noise.max(LEAST_ERROR * self.half)
+    }
+
     pub fn of<'r>(channels: impl Iterator<Item = (&'r Record, &'r Channel)>) -> Self {
         let measured = |(record, channel): (&Record, &Channel)| -> (Vec<f64>, f64) {
             let samples: Vec<usize> = (0..record.len()).filter(|&k| channel.values[k].is_finite()).collect();

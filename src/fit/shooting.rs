@@ -1,14 +1,12 @@
 //! Multiple shooting for far starts: the records in pieces that begin near the measurements, and continuity asked for step by step.
 
-use super::moves::{Movement, NEAR};
+use super::moves::{EXPLAINS, Movement, NEAR};
 use crate::numeral::number;
 use crate::optimize::{Domain, LeastSquares, LevenbergMarquardt, Machine, OwnSize, Request, Stop};
 use crate::problem::{Control, Objective, Problem, Shooting, Whitening};
 use crate::record::Record;
 use std::fmt;
 
-/// The least noise of an output that pieces are compared with, as a part of half its range.
-const LEAST_NOISE: f64 = 0.01;
 /// The least samples of a piece.
 const LEAST: usize = 8;
 /// The first pieces are the longest ones, in halvings, whose error from the start is at most this part of half the range: with shorter ones, the
@@ -17,8 +15,7 @@ const EXPLAINED: f64 = 0.5;
 /// Pieces of half the length follow where an end is not near the noise; so many lengths are tried.
 const LENGTHS: usize = 4;
 /// A search with fixed multipliers ends where the next step would lower the cost by this part. Multipliers that change before, or a penalty that rises,
-/// lead to other minima. It is made in parts of so many trial steps, up to some, as long as the pieces explain something: those that end right have taken
-/// most of the way by then.
+/// lead to other minima. After so many trial steps it goes on only if the error of the pieces is below [`EXPLAINED`], up to so many times.
 const INNER: Stop = Stop { step: 1e-10, gradient: 1e-8, cost: 1e-4, iterations: 100 };
 const PARTS: usize = 5;
 /// The most searches.
@@ -28,10 +25,8 @@ const SHRUNK: f64 = 0.25;
 const STUCK: usize = 6;
 /// The last search is the one after which the largest gap is at most this part of the noise: a chaotic plant makes gaps larger by a factor of 1e8.
 const LAST: f64 = 1e-9;
-/// Continuity is closed where the largest gap is at most this part of the noise, and pieces explain the measurements where their error is at most so many
-/// times the noise.
+/// Continuity is closed where the largest gap is at most this part of the noise.
 const CLOSED: f64 = 1e-3;
-const EXPLAINS: f64 = 1.5;
 
 /// The end of multiple shooting.
 pub(super) struct Shot {
@@ -121,8 +116,7 @@ impl<'s> Aim<'s> {
         control: &'s Control,
     ) -> Option<Self> {
         let positive = |value: f64| if value > 0.0 { value } else { 1.0 };
-        let noise = movement.outputs.iter().map(|moves| moves.noise.max(LEAST_NOISE * moves.half));
-        let sigma: Vec<f64> = noise.map(positive).collect();
+        let sigma: Vec<f64> = movement.outputs.iter().map(|moves| positive(moves.level())).collect();
         let parts = movement.outputs.iter().zip(&sigma).filter(|(moves, _)| moves.half > 0.0);
         let part = parts.clone().map(|(moves, sigma)| sigma / moves.half).fold(0.0, f64::max);
         let squares = parts.clone().map(|(moves, sigma)| (moves.half / sigma).powi(2)).sum::<f64>();
@@ -175,7 +169,7 @@ impl<'s> Aim<'s> {
         all.map_err(|_| "outputs do not give the state where pieces begin, and the model is not compiled, so that there is no filter")
     }
 
-    /// Moves to the least cost with fixed multipliers, and tells whether a limit of trial steps ended that.
+    /// Moves `x` to the least cost with fixed multipliers, and tells whether a limit of trial steps ended the search.
     fn minimized(&self, shooting: &mut Shooting<'_>, x: &mut Vec<f64>, evaluations: &mut u64) -> bool {
         for _ in 0..PARTS {
             shooting.begin_at(x);
@@ -185,8 +179,7 @@ impl<'s> Aim<'s> {
             if count <= INNER.iterations {
                 return false;
             }
-            let explains = |cost: f64| self.misfit(cost) <= self.unexplained;
-            if !shooting.pass(x).is_ok_and(|passed| explains(passed.cost)) {
+            if !shooting.pass(x).is_ok_and(|passed| self.misfit(passed.cost) <= self.unexplained) {
                 break;
             }
         }

@@ -52,16 +52,9 @@ pub(super) struct Led {
     pub evaluations: u64,
     /// Whether a simulation from their end follows the measurements as well as the predictions do.
     pub follows: bool,
-    /// Whether the predictions of the last stage are near the measurements.
-    pub near: bool,
 }
 
 impl Led {
-    /// Whether what led there is as near the measurements as their noise lets it be.
-    pub fn explains(&self) -> bool {
-        self.shot.as_ref().map_or(self.follows && self.near, |shot| shot.explains())
-    }
-
     /// The path, in words.
     pub fn path(&self) -> String {
         let stages = || format!("{} ({STAGES})", counted(self.stages.into(), "stage"));
@@ -199,8 +192,7 @@ impl Stages<'_> {
         let (mut found, mut nearest): (_, f64) = (None, self.distance(start).unwrap_or(f64::INFINITY));
         let mut evaluations = 0;
         loop {
-            let (coordinates, led) = self.lead_from(start, memory, control);
-            let near = led.near;
+            let (coordinates, led, near) = self.lead_from(start, memory, control);
             evaluations += led.evaluations;
             let distance = self.distance(&coordinates).unwrap_or(f64::INFINITY);
             let no_better = found.is_some() && distance > BETTER * nearest;
@@ -215,10 +207,11 @@ impl Stages<'_> {
         }
     }
 
-    /// The end of the stages from a start, of which the first one has this memory (s). The last stage is the first one after which a simulation follows
-    /// the measurements as well as the predictions do, one that does not explain them, or the one before a stage that fails.
-    fn lead_from(&self, start: &[f64], mut memory: f64, control: &Control) -> (Vec<f64>, Led) {
-        let (mut coordinates, mut led) = (start.to_vec(), Led::default());
+    /// The end of the stages from a start, of which the first one has this memory (s), and whether its predictions are near the measurements. The
+    /// last stage is the first one after which a simulation follows the measurements as well as the predictions do, one that does not explain them,
+    /// or the one before a stage that fails.
+    fn lead_from(&self, start: &[f64], mut memory: f64, control: &Control) -> (Vec<f64>, Led, bool) {
+        let (mut coordinates, mut led, mut near) = (start.to_vec(), Led::default(), false);
         for stage in 1..=MOST {
             if control.stops() {
                 break;
@@ -232,7 +225,7 @@ impl Stages<'_> {
             led.evaluations += end.evaluations;
             let Some(predicted) = errors(&problem, &coordinates, control) else { break };
             let parts = || predicted.iter().zip(&self.movement.outputs).filter(|(_, moves)| moves.half > 0.0);
-            led.near = parts().all(|(error, moves)| *error <= NEAR * moves.noise);
+            near = parts().all(|(error, moves)| *error <= NEAR * moves.noise);
             if parts().any(|(error, moves)| *error > UNEXPLAINED * moves.half) {
                 break;
             }
@@ -243,7 +236,7 @@ impl Stages<'_> {
                 break;
             }
         }
-        (coordinates, led)
+        (coordinates, led, near)
     }
 
     /// The sum over the outputs of the mean square error of a simulation, in units of half the range; `None` where it cannot be evaluated.

@@ -244,12 +244,14 @@ fn an_unstable_simulation() {
     let record = record(&Lag, 1.0, &lag(3.0, 1.0, 1.0, 3000, 1e-3));
     let fit = || Fit::new(&Lag, &record).parameters(free_pair(-3.0, 1.0));
     let parts = ["`bench`, sample", "`x`", "overflows", "horizon"];
-    says(fit().integrator(Rk45::default()).run(), &parts);
+    says(fit().integrator(Rk45::default()).starts(1).run(), &parts);
     says(fit().integrator(Rk4 { substeps: 10 }).starts(1).run(), &parts);
-    // In stages, from the same start.
-    let led = fit().integrator(Rk4 { substeps: 10 }).run().unwrap();
-    let error = led.knowledge.a.standard_error().unwrap();
-    assert!((led.parameters.a - 3.0).abs() < 4.0 * error && error < 0.01, "{led}");
+    // In stages, from the same start; by multiple shooting alone where the integrator chooses its steps.
+    for led in [fit().integrator(Rk4 { substeps: 10 }).run().unwrap(), fit().integrator(Rk45::default()).run().unwrap()]
+    {
+        let error = led.knowledge.a.standard_error().unwrap();
+        assert!((led.parameters.a - 3.0).abs() < 4.0 * error && error < 0.01, "{led}");
+    }
     // A stable estimate, made unstable.
     let stable = Fit::new(&Lag, &record).parameters(free_pair(3.0, 1.0)).integrator(Rk4 { substeps: 10 });
     let mut summary = stable.run().unwrap().into_summary();
