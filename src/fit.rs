@@ -148,7 +148,8 @@ impl<'a, M: Made> Fit<'a, M> {
 
     /// Sets the integrator. It is kept, with a warning if its step moves the answer.
     ///
-    /// Without it, a fit of a continuous model begins with [`Rk4`](crate::Rk4), one step per sample. While a finer step would move an
+    /// Without it, a fit of a continuous model begins with [`Rk4`](crate::Rk4), one step per sample (a filter of linear equations with evenly
+    /// spaced samples takes their exact transition, [`Kalman`](crate::Kalman)). While a finer step would move an
     /// unknown by more than a tenth of its standard error, where the start cannot be simulated, or where a search that did not
     /// converge had a cost that a finer step changes, it takes 4, 16, 64 and 256 steps per sample, then [`Esdirk`](crate::Esdirk); the estimate
     /// names the method ([`Method::integrator`](crate::estimate::Method)), and is not usable if none is fine enough. A finer step
@@ -204,9 +205,9 @@ impl<'a, M: Made> Fit<'a, M> {
     /// found.
     ///
     /// Unless set, a fit searches from the declared start. If it is not usable and the model leaves one of the
-    /// outputs unexplained ([`WarningCode::Unexplained`](crate::WarningCode::Unexplained)), it goes on to search from 32 starts by itself, after
-    /// 150 evaluations of each from the best four only, and says so; with `starts(1)` it does not, nor with more than 20,000 samples
-    /// (2,000 where the model does not run in vector registers).
+    /// outputs unexplained ([`WarningCode::Unexplained`](crate::WarningCode::Unexplained)), it goes on by itself: in stages ([`staged`](Fit::staged)), and,
+    /// where these do not lead to errors near the noise, from 32 starts, after 150 evaluations of each from the best four only. It says so; with
+    /// `starts(1)` it does not, and with more than 20,000 samples (2,000 where the model does not run in vector registers) in stages only.
     ///
     /// The first start is the declared one. The others are a Latin hypercube (McKay, Beckman and Conover, Technometrics 21
     /// (1979) 239), the same in every run. Of each unknown they span
@@ -247,14 +248,15 @@ impl<'a, M: Made> Fit<'a, M> {
     ///
     /// A fit goes in stages without being asked where the declared start cannot be simulated by any of its methods. It does so, too, where its search
     /// leaves an output unexplained: it searches from further starts after that only if the errors of the minimum that the stages lead to are above
-    /// 1.5 times the noise, and records are not long. After `starts(1)` it does neither. A fit that was asked for stages searches from no further starts by itself.
+    /// 1.5 times the noise, and records are not long. After `starts(1)` it does neither. A fit that was asked for stages searches from no further
+    /// starts by itself.
     ///
     /// Where no simulation follows the measurements after the last stage, multiple shooting goes on from there
     /// ([`multiple_shooting`](Fit::multiple_shooting)). A start is kept where a simulation from their end is no nearer to the measurements, nor
     /// are the pieces near them. Stages need a simulation to be predicted ([`FreeRun`](crate::FreeRun), the default), and no pre-filter; where the
     /// model cannot be read as a graph, has more than six states, or its integrator chooses its steps, they are multiple shooting alone. The estimate says
-    /// what came of them ([`WarningCode::Staged`](crate::WarningCode::Staged)). Their evaluations are counted, their trial steps (100 each at most)
-    /// are not.
+    /// what came of them ([`WarningCode::Staged`](crate::WarningCode::Staged)). The evaluations of stages that led somewhere are counted, their
+    /// trial steps are not.
     ///
     /// ```
     /// # use greybox::{Experiment, Fit, free, pmsm::{Surface, Winding}};
@@ -284,9 +286,12 @@ impl<'a, M: Made> Fit<'a, M> {
     /// Where the pieces explain the measurements and one simulation of a whole record does not (a chaotic plant, over many times the time in which errors
     /// double), the parameters are those of pieces as long as possible, each with an initial state of its own. The verdict is that of the
     /// whole record, not usable; the note has the standard errors of the pieces. Fit these ([`Experiment::slice`](crate::Experiment::slice)) for a verdict
-    /// of their own.
+    /// of their own. Not so with [`starts`](Fit::starts), nor with parameters per experiment. Where a simulation of a whole record cannot even be run
+    /// with the right parameters (it overflows), the search begins at the declared start, and the note has the pieces.
     ///
-    /// A start is kept where there are no pieces: a record of fewer than 16 samples, pieces of eight samples that cannot be simulated,
+    /// Errors of pieces are squared and divided by the noise, whatever the loss of the fit; weights count, and outputs that do not move do not.
+    ///
+    /// A start is kept where there are no pieces: no record of 16 samples, pieces of eight samples that cannot be simulated,
     /// outputs that do not give the state where the model has no filter (it cannot be read as a graph, or has more than six states), a predictor that corrects
     /// the state, a pre-filter. The note says so.
     ///

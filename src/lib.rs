@@ -97,7 +97,7 @@
 //!
 //! # Features
 //!
-//! `std`, `csv`, `jit` (machine code for models that can be traced), `parallel` and `text` are on by default. Without `std`
+//! `std`, `csv`, `npy`, `jit` (machine code for models that can be traced), `parallel` and `text` are on by default. Without `std`
 //! there are numbers, signals, models, integrators and [`online`] observers, without `alloc` too.
 #![cfg_attr(not(feature = "std"), no_std)]
 

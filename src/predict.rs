@@ -153,6 +153,8 @@ pub(crate) trait Prediction: Debug + Send + Sync {
     fn numbers(&self) -> Vec<f64>;
     /// This predictor to the second order, of a filter of first order.
     fn second_order(&self) -> Option<Arc<dyn Prediction>>;
+    /// Whether it is a filter of the model's process noise, of first or second order.
+    fn is_filter(&self) -> bool;
     fn check(&self, layout: &Layout) -> Result<(), Error>;
     fn describe(&self) -> String;
     fn values(&self) -> &dyn Steps<f64>;
@@ -227,6 +229,12 @@ impl<P: Predictor> Prediction for P {
             Some(starting) => Some(Arc::new(starting.second_order())),
             None => this.is::<Kalman>().then(|| Arc::new(SecondOrder) as Arc<dyn Prediction>),
         }
+    }
+
+    fn is_filter(&self) -> bool {
+        let this: &dyn Any = self;
+        let is_second = this.is::<SecondOrder>() || this.is::<Starting<SecondOrder>>();
+        is_second || Prediction::second_order(self).is_some()
     }
 
     fn check(&self, layout: &Layout) -> Result<(), Error> {

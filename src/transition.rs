@@ -10,6 +10,10 @@ use crate::scalar::Scalar;
 const SHORT: f64 = 1.0 / 16.0;
 /// Terms of the series over a first step: the next one is below rounding, for covariances `(2 / 16)^11 / 11! = 3e-18`.
 const TERMS: usize = 10;
+/// With fewer doublings the series has a term for each product of entries along a chain of states, there and back and once more for slopes: a chain of
+/// integrators does not grow, however long the step, and its parts that the series lacks are left out of the interval. More doublings bring
+/// them, up to `2^-70` of themselves.
+const FEW: f64 = 6.0;
 /// Doublings in which a stable plant must come to rest: the slowest and the fastest time constant are up to a factor of some 1e10 apart.
 const DOUBLINGS: usize = 40;
 /// Doublings of a first step at most: an interval is up to 1e28 times as long as the fastest time constant.
@@ -38,7 +42,7 @@ pub(crate) struct Restless {
 }
 
 impl<S: Scalar> Transition<S> {
-    /// Over one step of a discrete plant, `x[k+1] = a x[k] + w`; `q` is the covariance of `w`.
+    /// Over one step of a discrete plant, `x[k+1] = a x[k] + w`; `q` is the covariance of `w`. It has no inputs.
     pub fn discrete(n: usize, mut a: Vec<S>, q: Vec<S>) -> Self {
         a.iter_mut().step_by(n + 1).for_each(|a| *a -= 1.0);
         let none = vec![S::from(0.0); n * n];
@@ -59,7 +63,8 @@ impl<S: Scalar> Transition<S> {
             ((0..n * n).map(first(1)).collect(), (0..n * n).map(first(2)).collect());
         let mut term: Vec<S> = q.iter().map(|q| *q * short).collect();
         let mut covariance = term.clone();
-        for k in 2..=TERMS + 1 {
+        let terms = if halvings < FEW { TERMS.max(3 * n) } else { TERMS };
+        for k in 2..=terms + 1 {
             // The term before this one, divided by the next numbers.
             constant.iter_mut().zip(&power).for_each(|(sum, term)| *sum += *term / k as f64);
             ramp.iter_mut().zip(&power).for_each(|(sum, term)| *sum += *term / (k * (k + 1)) as f64);
@@ -238,6 +243,33 @@ mod tests {
                 let grown = constant[at] - if at % 3 == 0 { h } else { 0.0 };
                 // What is left of two numbers as large as the interval.
                 assert!((of_ramp[at] * h - grown).abs() < 1e-11 * (grown.abs() + h), "{h}, {at}: {}", of_ramp[at]);
+            }
+        }
+    }
+
+    /// Seven integrators in a row, the last one of white noise: `x_i` after `h` is the integral of `s^m / m!` times the noise, `m = 6 - i`, so that
+    /// `P_ij = h^{m+l+1} / ((m + l + 1) m! l!)`; with a leak that is slow against the interval nearly so.
+    #[test]
+    fn of_a_chain_of_integrators() {
+        const N: usize = 7;
+        let factorial = |m: usize| (1..=m).product::<usize>() as f64;
+        for (leak, h, digits) in [(0.0, 1.0, 1e-13), (0.0, 100.0, 1e-13), (1e-10, 100.0, 1e-7)] {
+            let mut a = [0.0; N * N];
+            (0..N).for_each(|i| a[i * N + i] = -leak);
+            (0..N - 1).for_each(|i| a[i * N + i + 1] = 1.0);
+            let mut q = [0.0; N * N];
+            q[N * N - 1] = 1.0;
+            let Transition { added, constant, covariance, .. } = Transition::over(N, &a, &q, h);
+            for (i, j) in (0..N).flat_map(|i| (0..N).map(move |j| (i, j))) {
+                let (m, l) = (N - 1 - i, N - 1 - j);
+                let exact = h.powi((m + l + 1) as i32) / ((m + l + 1) as f64 * factorial(m) * factorial(l));
+                let found = covariance[i * N + j];
+                assert!((found / exact - 1.0).abs() < digits, "{leak}, {h}, {i}, {j}: {found} {exact}");
+            }
+            for (i, j) in (0..N).flat_map(|i| (i + 1..N).map(move |j| (i, j))) {
+                let power = |m: usize| h.powi(m as i32) / factorial(m);
+                let found = [added[i * N + j] / power(j - i), constant[i * N + j] / power(j - i + 1)];
+                assert!(found.iter().all(|found| (found - 1.0).abs() < digits), "{leak}, {h}, {i}, {j}: {found:?}");
             }
         }
     }

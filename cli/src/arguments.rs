@@ -8,7 +8,7 @@ use std::path::PathBuf;
 ///
 /// A model is a file (`greybox new` writes one) or the name of one that ships (`greybox models`). A record is a file with a
 /// column for each input and output and one for time: CSV, or, where this build has the features for them, Parquet, Arrow, MATLAB,
-/// HDF5 and NumPy archives. Options may stand in a file `greybox.toml` in the present folder, by
+/// HDF5 and NumPy archives. Options may stand in a file `greybox.toml` in the current folder, by
 /// their long names; then `greybox fit` repeats the fit.
 ///
 /// Exit codes: 0 usable, 2 usable with care, 3 not usable, 1 error.
@@ -17,7 +17,7 @@ use std::path::PathBuf;
 pub struct Arguments {
     #[command(subcommand)]
     pub command: Command,
-    /// Take care as not usable: exit code 3 instead of 2.
+    /// Treat "usable with care" as not usable: exit code 3 instead of 2.
     #[arg(long, global = true)]
     pub strict: bool,
     /// Print results only, no progress and no remarks.
@@ -41,7 +41,7 @@ pub enum Command {
     Bootstrap(Bootstrap),
     /// Fit many records, each by itself, into one table.
     Fleet(Fleet),
-    /// Look at a model and at records without a fit: units, columns, gaps, and what the data can tell apart.
+    /// Check a model and records without a fit: units, columns, gaps, and which unknowns the data determine.
     Check(Check),
     /// Write a record in another format: CSV or JSON.
     Convert(Convert),
@@ -58,7 +58,7 @@ pub enum Command {
 }
 
 /// The model and what is changed of its declarations.
-#[derive(Args, Clone, Default)]
+#[derive(Args, Clone, Debug, Default)]
 pub struct ModelOptions {
     /// Give a constant of the model another value.
     #[arg(long, value_name = "NAME=VALUE", value_parser = assignment)]
@@ -94,14 +94,14 @@ pub struct ModelOptions {
 }
 
 /// What stands first in a date.
-#[derive(Clone, Copy, ValueEnum)]
+#[derive(Clone, Copy, Debug, ValueEnum)]
 pub enum Order {
     Day,
     Month,
 }
 
 /// How files become records.
-#[derive(Args, Clone, Default)]
+#[derive(Args, Clone, Debug, Default)]
 pub struct RecordOptions {
     /// The column of a signal, or of the time `t`, if it has another name.
     #[arg(long, value_name = "SIGNAL=COLUMN", value_parser = assignment)]
@@ -130,13 +130,13 @@ pub struct RecordOptions {
     /// Use the samples between two times (s) only: `1.5..20`; either may be left out.
     #[arg(long, value_name = "FROM..TO")]
     pub between: Option<String>,
-    /// Use every n-th sample only.
+    /// Keep every n-th sample; held inputs become their means in between.
     #[arg(long, value_name = "N")]
     pub every: Option<usize>,
 }
 
 /// What is minimized, and how.
-#[derive(Args, Clone, Default)]
+#[derive(Args, Clone, Debug, Default)]
 pub struct FitOptions {
     /// The standard deviation of the noise of an output; without it, that of the model file, or it is estimated.
     #[arg(long, value_name = "OUTPUT=STD", value_parser = assignment)]
@@ -153,10 +153,12 @@ pub struct FitOptions {
     /// The weight of each sample: an expression of time, inputs and outputs: `abs(w)`.
     #[arg(long, value_name = "EXPRESSION")]
     pub weight: Option<String>,
-    /// A filter of the errors: order and cut-off (Hz), `low-pass:4,100`, `high-pass:2,0.5`.
+    /// A filter of the errors: order and cut-off (Hz), `low-pass:4,100`, `high-pass:2,0.5`; in a fleet the sample time (s), too:
+    /// `low-pass:4,100,1e-3`.
     #[arg(long, value_name = "FILTER")]
     pub prefilter: Option<String>,
-    /// What is predicted: simulation, `horizon:5` (samples), kalman, second-order, with `:stationary` or `:first-interval` for its start.
+    /// What is predicted: `simulation` (the default), `horizon:5` (samples ahead), `kalman` or `second-order`; the last two with `:stationary` or
+    /// `:first-interval` for the covariance at the first sample.
     #[arg(long)]
     pub predictor: Option<String>,
     /// The integrator: automatic, `rk4:4` (steps per sample), `rk45:1e-8`, `esdirk:1e-8`, discrete.
@@ -210,7 +212,7 @@ pub struct Fit {
     /// Write the estimate as JSON, for programs and for `compare` and `simulate`.
     #[arg(long, value_name = "FILE")]
     pub json: Option<PathBuf>,
-    /// Draw measured and predicted outputs: .svg or .png.
+    /// Draw measured and predicted outputs: .svg, or .png where this build has the feature `png`.
     #[arg(long, value_name = "FILE")]
     pub plot: Option<PathBuf>,
     /// Print the whole report instead of the estimate.
@@ -250,7 +252,7 @@ pub struct Simulate {
     /// Add white noise to an output.
     #[arg(long, value_name = "OUTPUT=STD", value_parser = assignment)]
     pub noise: Vec<(String, String)>,
-    /// Which noise.
+    /// The seed of the random numbers.
     #[arg(long, value_name = "NUMBER", default_value_t = 1)]
     pub seed: u64,
     /// Where the record goes: .csv or .json; without it, as CSV to standard output.
@@ -301,7 +303,7 @@ pub struct Bootstrap {
     /// Resample blocks of so many samples (0: chosen) instead of single residuals.
     #[arg(long, value_name = "SAMPLES")]
     pub blocks: Option<usize>,
-    /// Which random numbers.
+    /// The seed of the random numbers.
     #[arg(long, value_name = "NUMBER", default_value_t = 1)]
     pub seed: u64,
 }
@@ -321,8 +323,8 @@ pub struct Fleet {
     pub of_records: RecordOptions,
     #[command(flatten, next_help_heading = "Fit")]
     pub of_fit: FitOptions,
-    /// The table, .csv or .parquet: one row for each record. Records that it has already are not fitted again, nor those that
-    /// a run had done that was killed.
+    /// The table, .csv or .parquet: one row for each record. Records that are in it, or in the journal of an interrupted run,
+    /// are not fitted again.
     #[arg(short, long, value_name = "FILE")]
     pub out: Option<PathBuf>,
 }
@@ -373,7 +375,7 @@ pub struct Models {
     pub name: Option<String>,
 }
 
-#[derive(Clone, Copy, ValueEnum)]
+#[derive(Clone, Copy, Debug, ValueEnum)]
 pub enum Language {
     Toml,
     Rust,

@@ -66,7 +66,13 @@ fn entrant(name: &str, one: &Compare, terminal: &Terminal) -> Result<Entrant, Fa
     let loaded = Loaded { model, files: one.records.clone(), records, parameters };
     let problem = watched(&loaded, &one.of_fit, terminal)?.problem()?;
     let estimate = match &stored {
-        Some(path) => estimate(path)?,
+        Some(path) => {
+            let found = estimate(path)?;
+            if found.layout.parameters != loaded.model.equations().layout().parameters {
+                return Err(format!("{}: the estimate is of a model with other parameters", path.display()).into());
+            }
+            found
+        }
         None => problem.run()?,
     };
     let title = match &stored {

@@ -10,6 +10,9 @@ use greybox::report::{Cell, Origin, Section, Table};
 use greybox::{Report, Summary};
 
 pub fn run(one: &Fit, terminal: &Terminal) -> Result<Verdict, Failure> {
+    output::check(one.json.as_deref(), &[])?;
+    output::check(one.report.as_deref(), &["html", "md", "json", "txt"])?;
+    output::check(one.plot.as_deref(), if cfg!(feature = "png") { &["svg", "png"] } else { &["svg"] })?;
     let loaded = load(&one.fitting, terminal)?;
     let derived: Vec<_> = one
         .derived
@@ -23,9 +26,6 @@ pub fn run(one: &Fit, terminal: &Terminal) -> Result<Verdict, Failure> {
     }
     let derived: Vec<Derived> =
         derived.iter().map(|(name, graph, root)| derived_by(&estimate, name, graph, *root)).collect();
-    if let Some(path) = &one.json {
-        output::write(Some(path), estimate.to_json()?.as_bytes())?;
-    }
     let wanted = one.full || one.report.is_some() || one.plot.is_some();
     let report = if wanted { Some(report(&problem, &estimate, &loaded, &derived)?) } else { None };
     match &report {
@@ -44,6 +44,9 @@ pub fn run(one: &Fit, terminal: &Terminal) -> Result<Verdict, Failure> {
                 output::line(format!("{name} = {value:.6}, {known}"))?;
             }
         }
+    }
+    if let Some(path) = &one.json {
+        output::write(Some(path), estimate.to_json()?.as_bytes())?;
     }
     if let (Some(report), Some(path)) = (&report, &one.report) {
         report.save(path)?;

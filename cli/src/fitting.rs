@@ -119,11 +119,13 @@ pub fn initial(layout: &Layout, said: &[String], before: &Initial) -> Result<Opt
     if said.is_empty() {
         return Ok(None);
     }
-    if said.iter().any(|one| one == "first") {
-        return Ok(Some(Initial::FirstSample));
+    match said {
+        [one] if one == "first" => return Ok(Some(Initial::FirstSample)),
+        [one] if one == "steady" => return Ok(Some(Initial::Steady)),
+        _ => {}
     }
-    if said.iter().any(|one| one == "steady") {
-        return Ok(Some(Initial::Steady));
+    if let Some(all) = said.iter().find(|one| *one == "first" || *one == "steady") {
+        return Err(format!("--initial {all}: it is all that may be said of the initial state").into());
     }
     let mut all = match before {
         Initial::Given(given) => given.clone(),
@@ -203,7 +205,11 @@ pub fn fit<'a>(
 
 /// The noise of the outputs as the model file has it, and as it was said, which goes before.
 fn noise(model: &Model, said: &[(String, String)]) -> Result<Vec<(String, f64)>, Failure> {
-    let said = numbers("--noise", said)?;
+    let mut said = numbers("--noise", said)?;
+    // The last one counts, as of other options.
+    said.reverse();
+    let mut known = std::collections::HashSet::new();
+    said.retain(|(output, _)| known.insert(output.clone()));
     let outputs = model.equations().layout().outputs.iter().map(|output| output.name.clone());
     let declared = outputs.zip(model.noise()).filter_map(|(output, noise)| Some((output, noise?)));
     let mut all: Vec<(String, f64)> =

@@ -10,11 +10,13 @@ use crate::arguments::Fleet;
 use crate::fitting::{declared, expanded, fit, model};
 use crate::terminal::Terminal;
 use crate::{Failure, Verdict, output, records};
+use greybox::optimize::Outcome;
 use greybox::record::Record;
 use greybox::text::Model;
 use row::{Header, Name, Row};
 use std::cell::RefCell;
 use std::collections::{HashMap, HashSet, VecDeque};
+use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::{Path, PathBuf};
 use table::Table;
 
@@ -27,7 +29,7 @@ pub fn run(one: &Fleet, terminal: &Terminal) -> Result<Verdict, Failure> {
         return Err("no record is named; write files or a pattern after the model: 'data/*.csv'".into());
     }
     let fleet = fit(&model, &[], &parameters, &one.of_fit)?.cancel(terminal.stop()).fleet()?;
-    let mut table = Table::open(one.out.as_deref(), Header::new(layout, one.by.as_deref())?)?;
+    let mut table = Table::open(one.out.as_deref(), Header::new(layout, one.by.as_deref())?, &made_by(one))?;
     let before = table.rows().len();
     if before > 0 {
         terminal.remark(format_args!("{before} records are in the table already"));
@@ -53,12 +55,10 @@ pub fn run(one: &Fleet, terminal: &Terminal) -> Result<Verdict, Failure> {
     });
     let there = there.filter_map(|(name, record)| reader.wait(name, record));
     for answer in fleet.run(there) {
-        // What Ctrl-C ended is no answer; the same command gives it.
-        if terminal.stopped() {
-            break;
-        }
         reader.add_errors(&mut table, terminal)?;
-        if let Some((name, _)) = reader.next() {
+        // What Ctrl-C ended is no answer; the same command gives it.
+        let is_whole = answer.as_ref().is_ok_and(|found| found.outcome != Outcome::Cancelled);
+        if let Some((name, _)) = reader.next().filter(|_| is_whole || !terminal.stopped()) {
             let row = Row::of(name, answer.as_ref().map_err(ToString::to_string));
             table.add(row, terminal)?;
             bar.set_message(format!("{} records, files", table.rows().len()));
@@ -82,7 +82,17 @@ pub fn run(one: &Fleet, terminal: &Terminal) -> Result<Verdict, Failure> {
     if one.out.is_none() {
         output::print(&table.csv()?)?;
     }
-    Ok(table.worst())
+    let worst = table.worst();
+    Ok(if terminal.stopped() { worst.max(Verdict::WithCare) } else { worst })
+}
+
+/// Model and options, as a number by which others are told from these.
+fn made_by(one: &Fleet) -> String {
+    let model = one.model.as_deref().unwrap_or_default();
+    let text = std::fs::read(model).unwrap_or_else(|_| model.into());
+    let mut hasher = DefaultHasher::new();
+    (text, format!("{:?}", (&one.of_model, &one.of_records, &one.of_fit))).hash(&mut hasher);
+    format!("{:016x}", hasher.finish())
 }
 
 /// Reads files, and keeps the names of the records that are being fitted in their order.

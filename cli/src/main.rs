@@ -27,7 +27,7 @@ mod terminal;
 use arguments::{Arguments, Command};
 use greybox::Severity;
 use std::process::ExitCode;
-use terminal::Terminal;
+use terminal::{Terminal, note};
 
 /// Why a command has no result, as a sentence.
 type Failure = Box<dyn std::error::Error>;
@@ -75,7 +75,7 @@ fn main() -> ExitCode {
             return code.into();
         }
         Err(project::Refused::Project(text)) => {
-            eprintln!("error: {text}");
+            note(format_args!("error: {text}"));
             return 1.into();
         }
     };
@@ -86,7 +86,7 @@ fn main() -> ExitCode {
             let text = error.to_string();
             // A mistake in a model file is shown with its place, after the same word.
             let word = if text.starts_with("error: ") { "" } else { "error: " };
-            eprintln!("{word}{text}");
+            note(format_args!("{word}{text}"));
             1.into()
         }
     }

@@ -22,6 +22,21 @@ pub fn write(path: Option<&Path>, content: &[u8]) -> Result<(), Failure> {
     })?)
 }
 
+/// Checks, before hours of work, that a file can be written: its folder is there, and its ending is one of these, if there are any.
+pub fn check(path: Option<&Path>, endings: &[&str]) -> Result<(), Failure> {
+    let Some(path) = path else { return Ok(()) };
+    let ending = ending(path);
+    if !endings.is_empty() && !endings.contains(&ending.as_str()) {
+        let known = endings.join(", .");
+        return Err(format!("{}: files ending in .{ending} are not written; take .{known}", path.display()).into());
+    }
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+    match folder.is_none_or(Path::is_dir) && !path.is_dir() {
+        true => Ok(()),
+        false => Err(format!("{}: there is no such folder, or a folder has this name", path.display()).into()),
+    }
+}
+
 /// Prints. A reader that has seen enough, such as `head`, is no error.
 pub fn print(content: &[u8]) -> Result<(), Failure> {
     match std::io::stdout().write_all(content).and_then(|()| std::io::stdout().flush()) {

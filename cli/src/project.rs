@@ -15,8 +15,12 @@ use std::ffi::OsString;
 use std::path::Path;
 use toml::Value;
 
-/// The file's name, in the present folder.
+/// The file's name, in the current folder.
 const FILE: &str = "greybox.toml";
+
+/// Options of a command that mean something else in others: the project's are those of `fit` and `fleet`.
+const OTHERS: [(&str, &str); 5] =
+    [("simulate", "noise"), ("simulate", "out"), ("convert", "out"), ("export", "out"), ("compare", "report")];
 
 /// Why there are no arguments.
 pub enum Refused {
@@ -35,13 +39,18 @@ pub fn arguments(words: Vec<OsString>) -> Result<Arguments, Refused> {
     let text = std::fs::read_to_string(path).map_err(|error| said(error.to_string()))?;
     let table: toml::Table = text.parse().map_err(|error: toml::de::Error| said(error.to_string()))?;
     let command = Arguments::command();
+    if words.get(1).is_some_and(|word| word == "help") {
+        return usage(&words);
+    }
     let Some(at) = words.iter().position(|word| command.find_subcommand(word).is_some()) else { return usage(&words) };
     let Some(subcommand) = command.find_subcommand(&words[at]) else { return usage(&words) };
     let options: Vec<&str> = subcommand.get_arguments().filter_map(|option| option.get_long()).collect();
     let takes_model = subcommand.get_positionals().any(|one| one.get_id() == "model");
-    if !takes_model {
+    // Its models and records are named by options; it takes the others.
+    if !takes_model && subcommand.get_name() != "compare" {
         return usage(&words);
     }
+    let means_another = |key: &str| OTHERS.contains(&(subcommand.get_name(), key));
     let (mut before, mut positionals) = (words[..=at].to_vec(), vec![]);
     let known: Vec<&str> = command
         .get_subcommands()
@@ -53,7 +62,9 @@ pub fn arguments(words: Vec<OsString>) -> Result<Arguments, Refused> {
         let words = words_of(key, value).map_err(said)?;
         match key.as_str() {
             "model" | "records" => positionals.push((key.clone(), words)),
-            _ if options.contains(&key.as_str()) || key == "strict" || key == "quiet" => before.extend(words),
+            _ if options.contains(&key.as_str()) && !means_another(key) || key == "strict" || key == "quiet" => {
+                before.extend(words)
+            }
             // An option of another command.
             _ if known.contains(&key.as_str()) => {}
             _ => return Err(said(format!("there is no option `{key}`; `greybox help fit` lists them"))),

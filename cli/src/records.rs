@@ -144,5 +144,20 @@ fn factor(signal: &str, unit: &str, layout: &Layout) -> Result<f64, Failure> {
         let available = all.iter().map(|quantity| quantity.name.clone()).collect();
         return Err(greybox::Error::Unknown { what: "signal".into(), name: signal.into(), available }.into());
     };
-    Ok(text::factor(unit, &quantity.unit)?)
+    let factor = text::factor(unit, &quantity.unit)?;
+    // Scales of temperature that begin at different zeros.
+    let zero = |unit: &str| match unit.trim() {
+        "degC" | "°C" | "℃" => "Celsius",
+        "degF" | "°F" | "℉" => "Fahrenheit",
+        _ => "an absolute one",
+    };
+    let (from, to) = (zero(unit), zero(&quantity.unit));
+    if from == to {
+        return Ok(factor);
+    }
+    let of_signal = &quantity.unit;
+    Err(format!(
+        "--unit {signal}={unit}: it has another zero than `{of_signal}`; convert the column, or write the factor of differences, {signal}={factor}"
+    )
+    .into())
 }

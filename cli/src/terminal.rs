@@ -4,10 +4,15 @@ use argmin::core::observers::Observe;
 use argmin::core::{KV, State};
 use greybox::optimize::LeastSquaresState;
 use indicatif::{ProgressBar, ProgressStyle};
-use std::io::IsTerminal;
+use std::io::{IsTerminal, Write};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::{Duration, Instant};
+
+/// A line on standard error. A reader that has seen enough is no error.
+pub fn note(text: impl std::fmt::Display) {
+    let _ = writeln!(std::io::stderr(), "{text}");
+}
 
 /// What stands between the command and whoever runs it.
 pub struct Terminal {
@@ -25,7 +30,7 @@ impl Terminal {
             if raised.swap(true, Ordering::Relaxed) {
                 std::process::exit(130);
             }
-            eprintln!("\nending with the best so far; once more to end at once");
+            note("\nending with the best so far; once more to end at once");
         });
         Terminal { quiet, stop }
     }
@@ -43,7 +48,7 @@ impl Terminal {
     /// A remark, in one line.
     pub fn remark(&self, text: impl std::fmt::Display) {
         if !self.quiet {
-            eprintln!("{text}");
+            note(text);
         }
     }
 

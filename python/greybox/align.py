@@ -86,6 +86,9 @@ def align(
 
 
 def _checked(name: str, times: Any, values: Any) -> tuple[Array, Array]:
+    if np.asarray(times).dtype.kind in "mM":
+        raise Error(f"signal `{name}` has dates as times; give seconds from one instant that all signals have in common")
+    times, values = (np.ma.filled(one.astype(np.float64), np.nan) if isinstance(one, np.ma.MaskedArray) else one for one in (times, values))
     times, values = np.asarray(times, dtype=np.float64), np.asarray(values)
     if values.dtype.kind not in "fiub":
         raise Error(f"signal `{name}` has {values.dtype} in place of numbers; leave it out")

@@ -8,6 +8,7 @@ from typing import Any
 
 from greybox.errors import Error
 from greybox.fleets import Plan, plan
+from greybox.frames import has_times
 from greybox.model import Model
 from greybox.parameters import Parameter
 from greybox.records import Hold, Initial, Record
@@ -67,10 +68,20 @@ def fleet(
     missing = [name for name in made.needed() if name not in frame.columns]
     if missing:
         raise Error(f"there is no column `{missing[0]}`; the frame has: {near(missing[0], frame.columns)}")
-    of = {name: pd.Series(dtype=frame.dtypes[name]) for name in made.by}
+    if made.record.time is None and not has_times(frame._meta):
+        raise Error('there is no column `t` or `time`, and no index of times; name the column by time="..."')
+    of = {name: pd.Series(dtype=_plain(frame.dtypes[name])) for name in made.by}
     meta = pd.DataFrame(of | {name: pd.Series(dtype=_TYPES[kind]) for name, kind in made.columns().items()})
     parts = frame if whole else frame.shuffle(on=made.by, npartitions=npartitions)
     return parts.map_partitions(_fit, made, meta.dtypes.to_dict(), meta=meta)
+
+
+def _plain(kind: Any) -> Any:
+    """Give the kind of the values of a column; of categories, which parts may not know, that of what they name."""
+    categories = getattr(kind, "categories", None)
+    if categories is None:
+        return "object" if str(kind) == "category" else kind
+    return "object" if "__UNKNOWN_CATEGORIES__" in categories else categories.dtype
 
 
 def _fit(part: Any, made: Plan, types: dict[str, Any]) -> Any:

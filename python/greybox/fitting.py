@@ -13,7 +13,7 @@ from greybox.model import Model, checked
 from greybox.options import Noise, settings
 from greybox.parameters import Parameter, declared, together
 from greybox.progress import Progress
-from greybox.records import Hold, Initial, Record, kind_of, records
+from greybox.records import Hold, Initial, Record, framed, kind_of, records
 from greybox.result import Fit
 from greybox.signals import named, near
 
@@ -91,7 +91,7 @@ def fit(
     staged : bool, optional
         Improve each start in stages before the search, by fits of predictions of a filter that corrects the state at each sample, in each further
         stage less: for starts from which a simulation diverges, and for chaotic or unstable plants. A fit does so by itself where its start cannot
-        be simulated.
+        be simulated, and where its search leaves an output unexplained.
     multiple_shooting : bool, optional
         Improve each start by multiple shooting alone: the records in pieces with initial states of their own, whose gaps are closed step by step. A fit
         with `staged` does so after its stages where a simulation does not follow the measurements yet; ask for one of the two.
@@ -157,7 +157,7 @@ def fit(
     problem = _core.Problem(equations.core, cores, declared_, chosen)
     with Progress(progress, "fit") as shown:
         estimate = problem.run(shown)
-    found = Fit(equations, cores, declared_, chosen, kind_of(several[0].data), estimate, problem)
+    found = Fit(equations, cores, declared_, chosen, kind_of(several[0].data), estimate, problem, what)
     for warning in found.warnings:
         if warning.severity != "usable":
             warn(warning)
@@ -219,6 +219,7 @@ def simulate(
         if unknown:
             raise Error(f"{what} names `{unknown[0]}`, and the model has: {near(unknown[0], known)}")
     start = [float(initial[name]) if initial and name in initial else None for name in states]
+    data = framed(data)
     record = Record(data, None, time, sample_time, columns, hold).core(equations, "simulation", outputs=False)
     found = equations.core.simulate(values, start, record, integrator)
     if noise:

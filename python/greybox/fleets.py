@@ -11,12 +11,12 @@ import numpy as np
 from greybox import _core
 from greybox.errors import Error
 from greybox.estimate import VERDICTS
-from greybox.frames import Frame, is_readonly, seconds
+from greybox.frames import Frame, is_readonly, rename, seconds
 from greybox.model import Model, checked
 from greybox.options import Options, settings
 from greybox.parameters import Parameter, declared, together
 from greybox.progress import Progress
-from greybox.records import Hold, Initial, Record, kind_of, opened
+from greybox.records import Hold, Initial, Record, framed, kind_of, opened
 from greybox.signals import named, near
 
 __all__ = ["Plan", "fleet"]
@@ -55,12 +55,24 @@ class Plan:
         taken = [name for name in self.by if name in self.columns()]
         if taken:
             raise Error(f"the column `{taken[0]}` of by has the name of a column of the result; rename it")
+        self._check()
+
+    def _check(self) -> None:
+        """Refuse what is wrong for all records, by one of two samples and a fleet of none."""
+        if self.record.sample_time is not None:
+            Frame({}).time(None, self.record.sample_time, 0)
+        zeros = (np.zeros(2), False)
+        self.record.of(self.equations, "record", np.array([0.0, 1.0]), dict.fromkeys(self._signals(), zeros))
+        _core.fleet(self.equations.core, [], self.declared, self.options, None)
+
+    def _signals(self) -> list[str]:
+        """Give the columns of inputs and outputs."""
+        signals = [*named(self.equations.inputs, "inputs"), *named(self.equations.outputs, "outputs")]
+        return list(dict.fromkeys(rename(signals, self.record.columns).values()))
 
     def needed(self) -> list[str]:
         """Give the columns that are read, but for the time."""
-        renamed = self.record.columns or {}
-        signals = [*named(self.equations.inputs, "inputs"), *named(self.equations.outputs, "outputs")]
-        return [*self.by, *(renamed.get(name, name) for name in signals)]
+        return list(dict.fromkeys([*self.by, *self._signals()]))
 
     def columns(self) -> dict[str, type]:
         """Give the columns of the result beside those of `by`, with the kind of their values."""
@@ -92,7 +104,7 @@ class Plan:
             raise Error(f"there is no column `{missing[0]}`; the frame has: {near(missing[0], frame.names)}")
         keys = [frame.values(name) for name in self.by]
         places, firsts = _groups(keys)
-        columns = {name: frame.column(name, name) for name in self.needed() if name not in self.by}
+        columns = {name: frame.column(name, name) for name in self._signals()}
         readonly = {name: is_readonly(column) for name, column in columns.items()}
         step = self.record.sample_time
         times, what = (np.zeros(0), "") if step is not None else frame.stamps(self.record.time)
@@ -261,4 +273,5 @@ def fleet(
     [0.3, 0.4]
     """
     made = plan(model, by, parameters, Record(None, None, time, sample_time, columns, hold, initial), given)
+    data = framed(data)
     return kind_of(data)(made.rows(data, progress=progress))

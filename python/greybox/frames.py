@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import mmap
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any, TypeAlias
 
@@ -10,20 +11,24 @@ import numpy as np
 from greybox.errors import Error
 from greybox.signals import near
 
-__all__ = ["Array", "Frame", "Kind", "is_readonly", "rename", "seconds", "time_column"]
+__all__ = ["Array", "Frame", "Kind", "has_times", "is_readonly", "rename", "seconds", "time_column"]
 
 Array: TypeAlias = "np.ndarray[Any, np.dtype[np.float64]]"
 
 #: Makes a frame of columns, of the kind that the caller handed over.
 Kind: TypeAlias = Callable[[Mapping[str, Any]], Any]
 
-_TIMES = ("t", "time", "Time", "TIME", "T", "timestamp", "Timestamp")
+_TIMES = ("t", "time", "Time", "TIME", "timestamp", "Timestamp")
 
 
 class Frame:
     """One measured record: columns by name, of any kind of frame."""
 
     def __init__(self, data: Any) -> None:
+        if isinstance(data, Frame):
+            # Opened once: a stream cannot be read again.
+            self.__dict__.update(data.__dict__)
+            return
         self._arrays: Mapping[Any, Any] | None = None
         self._frame: Any = None
         if isinstance(data, np.ndarray) and data.dtype.names is not None:
@@ -73,8 +78,13 @@ class Frame:
 
     def values(self, name: str) -> Any:
         """Give a column as it is."""
-        values = self._arrays[name] if self._arrays is not None else self._frame.get_column(name).to_numpy()
-        return np.asarray(values)
+        if self._arrays is not None:
+            return np.asarray(self._arrays[name])
+        column = self._frame.get_column(name)
+        if column.dtype.is_integer() and column.null_count():
+            # As floating-point numbers large ones would be rounded.
+            return np.array(column.to_list(), dtype=object)
+        return np.asarray(column.to_numpy())
 
     def time(self, name: str | None, sample_time: float | None, rows: int) -> Array:
         """Give the time of each row in seconds; of dates, since the first.
@@ -96,7 +106,7 @@ class Frame:
         Raises
         ------
         Error
-            If there is none, or it is neither numbers nor dates.
+            If there is none, or it is neither numbers nor dates. What is missing is refused by :func:`seconds`.
         """
         index = getattr(self.index, "name", None)
         if name is None:
@@ -125,6 +135,11 @@ def time_column(names: Iterable[str]) -> str | None:
     return next((one for one in _TIMES if one in there), None)
 
 
+def has_times(data: Any) -> bool:
+    """Whether a frame has a column of the time, or an index of times."""
+    return time_column(map(str, data.columns)) is not None or _index(data) is not None
+
+
 class Native:
     """Makes frames of a library of this name."""
 
@@ -143,6 +158,8 @@ def _narwhals(data: Any) -> Any:
 
     try:
         frame = nw.from_native(data)
+    except (ValueError, nw.exceptions.NarwhalsError) as error:
+        raise Error(f"the frame cannot be read: {error}") from None
     except TypeError:
         if not hasattr(data, "__arrow_c_stream__"):
             raise Error(
@@ -157,7 +174,9 @@ def _index(data: Any) -> Any:
     index = getattr(data, "index", None)
     if index is None or callable(index) or type(data).__module__.partition(".")[0] not in ("pandas", "modin", "cudf"):
         return None
-    return None if type(index).__name__ == "RangeIndex" else index
+    # So does what is left of a range where rows were dropped.
+    counts = type(index).__name__ == "RangeIndex" or (index.name is None and getattr(index.dtype, "kind", "") in "iu")
+    return None if counts else index
 
 
 def _dated(column: Any) -> Any:
@@ -168,11 +187,14 @@ def _dated(column: Any) -> Any:
         dates = column.cast(nw.Datetime("ns")) if column.dtype == nw.Date else column
         missing, stamps = column.is_null().any(), dates.dt.timestamp("ns")
     elif column.dtype == nw.Duration:
+        dates = column
         missing, stamps = column.is_null().any(), column.dt.total_nanoseconds()
     else:
         return None
     if missing:
-        raise Error(f"column `{column.name}` has rows without a time; drop them")
+        zone = getattr(column.dtype, "time_zone", None)
+        plain = dates.dt.convert_time_zone("UTC").dt.replace_time_zone(None) if zone else dates
+        return _stamps(plain.to_numpy(), f"column `{column.name}`")
     return stamps.to_numpy().astype("timedelta64[ns]")
 
 
@@ -195,7 +217,8 @@ def _no_numbers(name: str, value: Any, kind: str) -> Error:
 
 
 def _array_numbers(values: Any, name: str) -> Array:
-    array = np.ma.filled(values, np.nan) if isinstance(values, np.ma.MaskedArray) else np.asarray(values)
+    masked = isinstance(values, np.ma.MaskedArray) and values.dtype.kind in "fiub"
+    array = np.ma.filled(values.astype(np.float64), np.nan) if masked else np.asarray(values)
     if array.ndim != 1:
         raise Error(f"column `{name}` has the shape {array.shape}; give one number per sample")
     if array.dtype.kind not in "fiub":
@@ -218,9 +241,9 @@ def _stamps(values: Any, what: str) -> Any:
     if getattr(values, "tz", None) is not None:
         values = values.tz_convert("UTC").tz_localize(None)
     array = np.asarray(values)
+    if array.ndim != 1:
+        raise Error(f"{what} has the shape {array.shape}; give one time per sample")
     if array.dtype.kind in "mM":
-        if np.isnat(array).any():
-            raise Error(f"{what} has rows without a time; drop them")
         of = array.astype("datetime64[ns]") if array.dtype.kind == "M" else array.astype("timedelta64[ns]")
         return of.astype(np.int64).astype("timedelta64[ns]")
     if array.dtype.kind in "fiu":
@@ -233,7 +256,15 @@ def _stamps(values: Any, what: str) -> Any:
 
 
 def seconds(stamps: Any, what: str) -> Array:
-    """Give times in seconds; durations in nanoseconds count from the first."""
+    """Give times in seconds; durations in nanoseconds count from the first.
+
+    Raises
+    ------
+    Error
+        If one is missing, or they do not increase.
+    """
+    if stamps.dtype.kind == "m" and np.isnat(stamps).any():
+        raise Error(f"{what} has rows without a time; drop them")
     return _since_first(stamps.astype(np.int64), what) if stamps.dtype.kind == "m" else stamps
 
 
@@ -256,7 +287,9 @@ def is_readonly(array: Array) -> bool:
         if owner.flags.writeable:
             return False
         owner = owner.base
-    return owner is not None and not isinstance(owner, (bytearray, memoryview))
+    # Arrow may share memory of NumPy, and a file that is mapped may be written to.
+    shared = isinstance(owner, (bytearray, memoryview, mmap.mmap)) or type(owner).__module__.startswith("pyarrow")
+    return owner is not None and not shared
 
 
 def rename(names: Iterable[str], columns: Mapping[str, str] | None) -> dict[str, str]:
@@ -268,6 +301,8 @@ def rename(names: Iterable[str], columns: Mapping[str, str] | None) -> dict[str,
         If a signal is renamed that the model does not have.
     """
     of = {name: name for name in names}
+    if not isinstance(columns or {}, Mapping):
+        raise Error(f'columns is {columns!r}; give the column of each signal that has another name: {{"signal": "column"}}')
     for signal, column in (columns or {}).items():
         if signal not in of:
             raise Error(f"columns names `{signal}`, which is no input or output of the model; it has: {near(signal, of)}")

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from greybox import _core
 from greybox.errors import Error
+from greybox.signals import Vector
 from greybox.symbols import (
     Condition,
     Symbol,
@@ -148,6 +149,9 @@ def of_arrays(function: Any, args: tuple[Any, ...], kwargs: dict[str, Any]) -> A
     if name == "select":
         return _select(*args, **kwargs)
     if name in _BY_ENTRIES:
+        # An array of symbols that is joined is its entries; as it stands it would come back here.
+        if args and (isinstance(args[0], Vector) or (isinstance(args[0], np.ndarray) and args[0].dtype == object)):
+            args = ([*args[0]], *args[1:])
         result = function(*(_arrays(one) for one in args), **{key: _arrays(one) for key, one in kwargs.items()})
         return result.item() if isinstance(result, np.ndarray) and result.ndim == 0 else result
     refuse(f"np.{name} is not known for symbols; write it by + - * / **, np.where and functions such as np.sqrt, np.exp or np.sin")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 import os
 from collections.abc import Callable, Mapping
 from typing import Any, Literal, TypeAlias, TypedDict
@@ -10,7 +11,7 @@ from greybox.errors import Error
 from greybox.model import Equations, of_sample
 from greybox.signals import Signals, named, near
 
-__all__ = ["Noise", "Options", "settings"]
+__all__ = ["Noise", "Options", "settings", "whole"]
 
 #: What is said of the noise of the outputs: a standard deviation for each, or that the covariance of all is estimated.
 Noise: TypeAlias = "Mapping[str, float] | Literal['covariance']"
@@ -25,6 +26,9 @@ def _name(what: str, text: str | None) -> str | None:
 def _levels(what: str, given: Mapping[str, float] | None, signals: Signals) -> list[float] | None:
     if given is None:
         return None
+    if not isinstance(given, Mapping):
+        first = next(iter(signals), "name")
+        raise Error(f'{what} is {given!r}; give a standard deviation for each by its name: {{"{first}": 0.1}}')
     for name in given:
         if name not in signals:
             raise Error(f"{what} names `{name}`, and the model has: {near(name, signals)}")
@@ -32,6 +36,23 @@ def _levels(what: str, given: Mapping[str, float] | None, signals: Signals) -> l
     if missing:
         raise Error(f"{what} lacks `{missing[0]}`; give a standard deviation for each of {', '.join(signals)}")
     return [float(given[name]) for name in signals]
+
+
+def whole(what: str, value: Any, least: int) -> int:
+    """Give a whole number, also one of NumPy.
+
+    Raises
+    ------
+    Error
+        If it is none, or less than `least`.
+    """
+    try:
+        number = operator.index(value)
+    except TypeError:
+        number = least - 1
+    if number < least:
+        raise Error(f"{what} is {value!r}; take a whole number of {least} or more")
+    return number
 
 
 class Options(TypedDict, total=False):
@@ -59,8 +80,8 @@ def settings(equations: Equations, given: Options) -> dict[str, Any]:
     noise, starts = given.get("noise"), given.get("starts")
     if isinstance(noise, str) and noise != "covariance":
         raise Error(f'noise is {noise!r}; give a standard deviation for each output, {{"name": 0.1}}, or "covariance"')
-    if starts is not None and (not isinstance(starts, int) or starts < 1):
-        raise Error(f"starts is {starts!r}; take a whole number of 1 or more")
+    if starts is not None:
+        starts = whole("starts", starts, 1)
     if given.get("staged") and given.get("multiple_shooting"):
         raise Error("staged and multiple_shooting are both asked for; take one: a staged fit shoots by itself where it helps")
     weighting, checkpoint = given.get("weighting"), given.get("checkpoint")

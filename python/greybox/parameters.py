@@ -60,6 +60,8 @@ def declared(given: Mapping[str, Any], names: Signals, what: str = "parameter") 
     Error
         If one is missing, unknown, or not declared by :func:`free` or :func:`fixed`.
     """
+    if not isinstance(given, Mapping):
+        raise Error(f"{what} {given!r}: give the declaration of each by its name")
     for name, value in given.items():
         if name not in names:
             raise Error(f"there is no {what} `{name}`; the model has: {near(name, names)}")

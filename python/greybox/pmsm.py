@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from greybox import _core
-from greybox.errors import Error
 from greybox.model import Equations
+from greybox.options import whole
 
 __all__ = ["surface"]
 
@@ -22,6 +22,4 @@ def surface(*, pole_pairs: int) -> Equations:
     Error
         If there is not at least one pair of poles.
     """
-    if not isinstance(pole_pairs, int):
-        raise Error(f"pole_pairs is {pole_pairs!r}; give a whole number")
-    return Equations(_core.surface(pole_pairs))
+    return Equations(_core.surface(whole("pole_pairs", pole_pairs, 1)))

@@ -19,7 +19,7 @@ from greybox.model import Equations
 from greybox.parameters import Parameter, declared
 from greybox.signals import Signals, named
 
-__all__ = ["Hold", "Initial", "Record", "kind_of", "opened", "records"]
+__all__ = ["Hold", "Initial", "Record", "filled", "framed", "kind_of", "opened", "records"]
 
 #: The inputs between samples, of all or by the name of each.
 Hold: TypeAlias = "Literal['zero', 'first'] | Mapping[str, Literal['zero', 'first']]"
@@ -129,6 +129,11 @@ def opened(data: Any) -> Any:
     return path if path.suffix.lower() in TEXT else read(path)
 
 
+def framed(data: Any) -> Any:
+    """Give data as a frame that is opened once, as a stream has to be; a path stays one."""
+    return data if isinstance(data, (str, os.PathLike)) else Frame(data)
+
+
 def kind_of(data: Any) -> Kind:
     """Give what makes a frame of the same kind; dicts where the data are a path."""
     return dict if isinstance(data, (str, os.PathLike)) else Frame(data).kind
@@ -153,8 +158,18 @@ def _check_lengths(columns: Mapping[str, Array], time: Array) -> None:
 
 
 def records(data: Any, defaults: Record) -> list[Record]:
-    """Give one or several records; what is said for all holds for those that are bare frames."""
+    """Give one or several records; what is said for all holds for each where it does not say it itself."""
     several = list(data) if isinstance(data, (list, tuple)) else [data]
     if not several:
         raise Error("there is no record; hand over a frame, or a list of at least one")
-    return [one if isinstance(one, Record) else replace(defaults, data=one) for one in several]
+    asked = [one if isinstance(one, Record) else Record(one) for one in several]
+    return [replace(filled(one, defaults), data=framed(one.data)) for one in asked]
+
+
+def filled(record: Record, defaults: Record) -> Record:
+    """Give a record in which what it does not say itself is as in another."""
+    said: dict[str, Any] = {name: getattr(record, name) for name in ("columns", "hold", "initial")}
+    said = {name: getattr(defaults, name) if one is None else one for name, one in said.items()}
+    if record.time is None and record.sample_time is None:
+        said |= {"time": defaults.time, "sample_time": defaults.sample_time}
+    return replace(record, **said)

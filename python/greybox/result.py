@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,11 +15,12 @@ from greybox.errors import Error
 from greybox.estimate import Estimate
 from greybox.frames import Array, Kind
 from greybox.model import Equations
+from greybox.options import whole
 from greybox.parameters import Parameter
 from greybox.process_noise import ProcessNoise
 from greybox.profile import Profile
 from greybox.progress import Progress
-from greybox.records import Record
+from greybox.records import Record, filled, framed, kind_of
 from greybox.report import Report
 from greybox.signals import named, near
 
@@ -42,7 +44,8 @@ class Fit(Estimate):
         options: Mapping[str, Any],
         kind: Kind,
         estimate: _core.Estimate,
-        problem: _core.Problem | None = None,
+        problem: _core.Problem | None,
+        what: Record,
     ) -> None:
         self._equations = equations
         self._records = records
@@ -51,6 +54,7 @@ class Fit(Estimate):
         self._kind = kind
         self._estimate = estimate
         self._made = problem
+        self._what = what
 
     def __getstate__(self) -> dict[str, Any]:
         return {**self.__dict__, "_made": None}
@@ -70,7 +74,8 @@ class Fit(Estimate):
             Another record; free initial states are estimated from its outputs, the parameters stay. Without it, the records of the
             fit with their estimated initial states.
         **said
-            Of a bare frame: `time`, `sample_time`, `columns`, `hold`, `initial`, as in :class:`Record`.
+            Of a bare frame: `time`, `sample_time`, `columns`, `hold`, `initial`, as in :class:`Record`; but for `initial`, those of the fit
+            where they are left out.
 
         Returns
         -------
@@ -125,28 +130,37 @@ class Fit(Estimate):
 
     def _states(self, data: Any, said: Mapping[str, Any], smoothed: bool) -> Any:
         states = list(named(self._equations.states, "states"))
+        data = _framed(data)
         cores = self._asked(data, said)
         parts: list[dict[str, Array]] = []
         for k, core in enumerate(cores):
             means, deviations = self._problem.states(self._estimate, core, k if data is None else None, smoothed)
             spreads = {f"{name}_deviation": one for name, one in zip(states, deviations, strict=True)}
             parts.append(dict(zip(states, means, strict=True)) | spreads)
-        return self._kind(_stacked(cores, parts))
+        return self._as(data)(_stacked(cores, parts))
 
     def _asked(self, data: Any, said: Mapping[str, Any]) -> list[_core.Record]:
+        if said and (data is None or isinstance(data, Record)):
+            of = "the records of the fit" if data is None else "a Record"
+            raise Error(f"{next(iter(said))} is said of {of}, which {'are' if data is None else 'is'} as before; hand over a bare frame")
         if data is None:
             return self._records
         record = data if isinstance(data, Record) else Record(data, **said)
-        return [record.core(self._equations, "record", outputs=False)]
+        return [filled(record, replace(self._what, initial=None)).core(self._equations, "record", outputs=False)]
+
+    def _as(self, data: Any) -> Kind:
+        """Give what makes a frame of the kind of these data, or of the fit's."""
+        return self._kind if data is None else kind_of(data.data if isinstance(data, Record) else data)
 
     def _predicted(self, data: Any, said: Mapping[str, Any], chosen: Any, kind: Kind | None = None) -> Any:
         outputs = list(named(self._equations.outputs, "outputs"))
+        data = _framed(data)
         cores = self._asked(data, said)
         parts: list[dict[str, Array]] = []
         for k, core in enumerate(cores):
             predicted, errors, _ = self._problem.predict(self._estimate, core, k if data is None else None)
             parts.append(chosen(core, dict(zip(outputs, predicted, strict=True)), dict(zip(outputs, errors, strict=True))))
-        return (kind or self._kind)(_stacked(cores, parts))
+        return (kind or self._as(data))(_stacked(cores, parts))
 
     def bands(self, probability: float = 0.95) -> Any:
         """Give how far from the prediction the outputs of the fit's records may be with this probability.
@@ -214,9 +228,8 @@ class Fit(Estimate):
         Error
             If blocks are longer than half of a record, or fewer than twenty refits ended.
         """
-        for name, value, least in (("count", count, 1), ("blocks", blocks, 0), ("seed", seed, 0)):
-            if value is not None and (not isinstance(value, int) or value < least):
-                raise Error(f"{name} is {value!r}; take a whole number of {least} or more")
+        count, seed = whole("count", count, 1), whole("seed", seed, 0)
+        blocks = None if blocks is None else whole("blocks", blocks, 0)
         with Progress(progress, "bootstrap", count) as shown:
             found = self._problem.bootstrap(self._estimate, blocks, count, seed, shown)
         return Bootstrap(self.unknowns, [row[2] for row in self._estimate.unknowns], count, seed, self._kind, found)
@@ -280,6 +293,11 @@ class Fit(Estimate):
 
         pictures = self._problem.report(self._estimate).pictures()
         return notebook.shown(self, pictures[0][1] if pictures else "")
+
+
+def _framed(data: Any) -> Any:
+    """Give data that are opened once; nothing and records as they are."""
+    return data if data is None or isinstance(data, Record) else framed(data)
 
 
 def _stacked(records: list[_core.Record], parts: list[dict[str, Array]]) -> dict[str, Any]:

@@ -19,7 +19,7 @@ SignalsLike: TypeAlias = "Signals | Mapping[str, str] | Iterable[str]"
 
 def near(name: str, names: Iterable[str]) -> str:
     """Name what is there, the nearest names first where there are many."""
-    names = [str(one) for one in names]
+    name, names = str(name), [str(one) for one in names]
     close = difflib.get_close_matches(name, names, n=5, cutoff=0.5)
     lower = difflib.get_close_matches(name.lower(), [one.lower() for one in names], n=5, cutoff=0.5)
     close += [one for one in names if one.lower() in lower and one not in close]
@@ -166,8 +166,9 @@ class Vector:
         return Vector(self._what, self._names, in_order(entries, self._names, f"like() of the {self._what}"))
 
     def __getattr__(self, name: str) -> Any:
-        if name.startswith("__"):
-            raise AttributeError(name)
+        # NumPy looks for its own attributes, and goes on without.
+        if name.startswith("__") or (name not in self._names and hasattr(np.ndarray, name)):
+            raise AttributeError(f"a vector has no attribute `{name}`; np.asarray(x) is an array of its entries")
         return self[name]
 
     def __getitem__(self, key: Any) -> Any:

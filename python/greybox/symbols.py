@@ -50,12 +50,12 @@ class Trace:
 
     def node(self, value: Any) -> _core.Node:
         """Give the node of a number, or of a symbol of this reading."""
+        if isinstance(value, np.ndarray) and value.ndim == 0:
+            value = value.item()
         if isinstance(value, Symbol):
             if value.trace is not self:
                 refuse(_KEPT)
             return value.node
-        if isinstance(value, np.ndarray) and value.ndim == 0:
-            value = value.item()
         if isinstance(value, _NUMBERS):
             return self.graph.constant(float(value))
         if isinstance(value, Condition):
@@ -206,6 +206,12 @@ class Condition:
         return Condition(self.trace, lambda a, b: self.choose(other.choose(b, a), other.choose(a, b)))
 
     __rand__, __ror__, __rxor__ = __and__, __or__, __xor__
+
+    def __eq__(self, other: object) -> Any:
+        return ~(self ^ other)
+
+    def __ne__(self, other: object) -> Any:
+        return self ^ other
 
     def __invert__(self) -> Condition:
         return Condition(self.trace, lambda a, b: self.choose(b, a))

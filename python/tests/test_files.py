@@ -188,6 +188,11 @@ def test_methods_of_alignment() -> None:
     assert np.flatnonzero(np.isfinite(own["slow"])).tolist() == list(range(0, 1001, 100)) and own["slow"][500] == 5.0
 
 
+def test_masks_are_missing_values() -> None:
+    masked = np.ma.array([1, 2, 3], mask=[0, 1, 0])
+    assert np.isnan(gb.align({"a": ([0.0, 1.0, 2.0], masked)}, method="own")["a"]).tolist() == [False, True, False]
+
+
 def test_alignment_warns_where_the_method_matters() -> None:
     signals = {"fast": (FAST, FAST), "slow": (SLOW, SLOW)}
     with pytest.warns(gb.RecordWarning, match="`slow` is sampled each 0.1 s and filled in each 0.001 s .last, late by 0.05 s") as caught:
@@ -210,6 +215,7 @@ WRONG: list[tuple[dict[str, Any], dict[str, Any], str]] = [
     ({"a": ([0.0, np.nan], [1.0, 2.0])}, {}, "a time that is no number at sample 1"),
     ({"a": ([], np.zeros(0))}, {}, "has no samples"),
     ({"a": ([0.0], ["x"])}, {}, "in place of numbers"),
+    ({"a": (np.array(["2025-03-20"], dtype="datetime64[ns]"), [1.0])}, {}, "has dates as times"),
     ({"a": ([0.0, 1.0], [1.0, 2.0]), "b": ([2.0, 3.0], [1.0, 2.0])}, {}, "`a` ends at 1 s, and `b` begins at 2 s"),
     ({"a": ([0.0, 1.0], [1.0, 2.0])}, {"step": 0.0}, "the step is 0.0"),
     ({"a": ([0.0, 1.0], [1.0, 2.0])}, {"method": "cubic"}, "method of `a` is 'cubic'"),

@@ -39,6 +39,26 @@ def test_a_row_for_each_record_and_failures_are_rows() -> None:
     assert good["body_rmse"].between(0.04, 0.06).all()
 
 
+def test_a_missing_date_spoils_one_record_alone() -> None:
+    start = pd.Timestamp("2025-03-20 14:00", tz="Europe/Berlin")
+    frame = bodies(3).assign(t=lambda f: start + pd.to_timedelta(f["t"], unit="s"))
+    frame.loc[250, "t"] = pd.NaT
+    for of in (frame, pl.from_pandas(frame)):
+        rows = gb.fleet(cooling(), of, by="which", k=gb.free(1.0))
+        assert list(rows["verdict"])[1] == "failed" and "rows without a time" in list(rows["reason"])[1]
+        assert [verdict != "failed" for verdict in rows["verdict"]] == [True, False, True]
+
+
+def test_records_of_one_input_each_and_keys_with_gaps() -> None:
+    parts = [pd.DataFrame(cooled(k=0.3 + 0.1 * k, seed=k)).assign(room=20.0 + k) for k in range(2)]
+    rows = gb.fleet(cooling(), pd.concat(parts, ignore_index=True), by="room", k=gb.free(1.0))
+    assert rows["room"].tolist() == [20.0, 21.0]
+    large = pl.DataFrame(bodies(3).drop(columns="which")).with_columns(
+        serial=pl.Series([9007199254740993] * 200 + [9007199254740992] * 200 + [None] * 200)
+    )
+    assert len(gb.fleet(cooling(), large, by="serial", k=gb.free(1.0))) == 3
+
+
 def test_each_row_is_the_single_fit() -> None:
     frame = bodies(6)
     rows = gb.fleet(cooling(), frame, by="which", k=gb.free(1.0))
@@ -76,6 +96,13 @@ WRONG: list[tuple[dict[str, Any], str]] = [
     ({"by": "which", "k": gb.free(1.0), "columns": {"body": "bdy"}}, "there is no column `bdy`"),
     ({"by": "which", "k": gb.free(1.0), "checkpoint": "c"}, "a fleet has no checkpoint"),
     ({"by": "which", "k": gb.free(1.0), "loss": gb.free(1.0)}, "`loss` is an option"),
+    ({"by": "which", "k": gb.free(1.0), "loss": "hubber"}, "hubber"),
+    ({"by": "which", "k": gb.free(1.0), "hold": "linear"}, "there is no hold `linear`"),
+    ({"by": "which", "k": gb.free(1.0), "sample_time": 0.0}, "must be positive"),
+    ({"by": "which", "k": gb.free(1.0), "columns": {"rom": "T"}}, "columns names `rom`"),
+    ({"by": "which", "k": gb.free(1.0), "columns": "room"}, "give the column of each signal"),
+    ({"by": "which", "k": gb.free(1.0), "initial": {"bdy": gb.fixed(0.0)}}, "there is no initial state of `bdy`"),
+    ({"by": "which", "k": gb.free(1.0), "noise": 0.1}, "give a standard deviation for each"),
 ]
 
 

@@ -117,6 +117,10 @@ WRONG: list[tuple[Callable[[dict[str, Any]], Any], str]] = [
     (lambda c: pd.DataFrame(c).rename(columns={"body": "Body"}), "there is no column `body`; the frame has: t, room, Body; did you mean `Body`?"),
     (lambda c: pd.DataFrame(c).drop(columns="room"), "there is no column `room`"),
     (lambda c: pd.DataFrame(c).drop(columns="t"), "there is no column `t` or `time`"),
+    # What is left of the numbers of rows is no time; nor is a temperature.
+    (lambda c: pd.DataFrame(c).drop(columns="t").iloc[5:].drop(index=9), "there is no column `t` or `time`"),
+    (lambda c: {"room": c["room"], "body": c["body"], "T": c["t"]}, "there is no column `t` or `time`"),
+    (lambda c: {**c, "t": c["t"].reshape(-1, 1)}, "has the shape (200, 1)"),
     (lambda c: pd.DataFrame(c).astype({"body": str}), "which is no number"),
     (lambda c: pl.DataFrame(c).cast({"body": pl.String}), "which is no number"),
     (lambda c: {**c, "body": [str(y) for y in c["body"]]}, "which is no number"),
@@ -176,6 +180,38 @@ def test_numbers_that_nothing_writes_to_are_shared() -> None:
     array.flags.writeable = False
     # Its owner could make it writable again.
     assert not is_readonly(array) and not is_readonly(array[::2])
+
+
+def test_a_stream_is_read_once() -> None:
+    reader = pa.table(cooled()).to_reader()
+    found = gb.fit(cooling(), reader, k=gb.free(1.0))
+    assert found.parameters.k == k_of(cooled()) and isinstance(found.residuals(), pa.Table)
+    rows = gb.fleet(cooling(), pa.table({**cooled(), "which": ["a"] * 200}).to_reader(), by="which", k=gb.free(1.0))
+    assert rows.num_rows == 1
+
+
+def test_what_is_said_of_all_holds_for_records_that_do_not_say_it() -> None:
+    c = {**cooled(), "Body": cooled()["body"]}
+    del c["body"]
+    said: dict[str, Any] = {"hold": "first", "columns": {"body": "Body"}}
+    found = gb.fit(cooling(), c, k=gb.free(1.0), **said)
+    again = gb.fit(cooling(), gb.Record(c, name="cold"), k=gb.free(1.0), **said)
+    assert found.parameters.k == again.parameters.k != k_of(cooled())
+    # So do predictions of other frames.
+    own = np.asarray(found.predict()["body"])
+    assert np.array_equal(np.asarray(found.predict(c)["body"]), own)
+    assert not np.array_equal(np.asarray(found.predict(c, hold="zero")["body"]), own)
+    assert isinstance(found.predict(pl.DataFrame(c)), pl.DataFrame)
+    for of in (None, gb.Record(c)):
+        with pytest.raises(gb.Error, match="hold is said of"):
+            found.predict(of, hold="zero")
+
+
+def test_memory_that_arrow_shares_is_copied() -> None:
+    c = cooled()
+    found = gb.fit(cooling(), pa.table(c), k=gb.free(1.0))
+    c["body"][:] = 0.0
+    assert np.abs(np.asarray(found.residuals()["body"])).max() < 0.3
 
 
 def test_a_frame_that_is_changed_during_a_fit_does_not_matter() -> None:

@@ -89,6 +89,9 @@ def test_branches_take_the_side_of_the_value(read: Read, value: float) -> None:
         lambda x: np.logical_not(x > 0) if not isinstance(x, float) else not x > 0,
         lambda x: np.logical_and(x > 0, x < 1),
         lambda x: (x > 0) & np.True_,
+        lambda x: (x > 0) == (x > 1),
+        lambda x: (x > 0) != (x > 1),
+        lambda x: (x > 0) == True,  # noqa: E712
     ]
     for condition in conditions:
         expected = 3.0 if condition(value) else 4.0
@@ -117,6 +120,8 @@ def test_vectors_and_matrices(read: Read) -> None:
     assert read(lambda x, u, p: (a @ np.array([x, u]))[1], 5.0, 6.0) == 39.0
     assert read(lambda x, u, p: (a @ np.stack([x, u]))[1], 5.0, 6.0) == 39.0
     assert read(lambda x, u, p: (a * x)[1, 0], 5.0) == 15.0
+    assert read(lambda x, u, p: np.stack(np.array([x, u]))[1], 5.0, 6.0) == 6.0
+    assert read(lambda x, u, p: np.asarray(x) * u, 5.0, 6.0) == 30.0
     assert read(lambda x, u, p: (x - np.array([1.0, 2.0]))[1], 5.0) == 3.0
     assert read(lambda x, u, p: np.sum(np.array([x, u, p])), 1.0, 2.0, 4.0) == 7.0
     assert read(lambda x, u, p: np.dot([1.0, 2.0], np.hstack([x, [u]])), 5.0, 6.0) == 17.0
@@ -125,6 +130,8 @@ def test_vectors_and_matrices(read: Read) -> None:
         lambda t, x, u, p: a @ x + u[0], states=["a", "b"], inputs=["u"], outputs=["a"], parameters=[], output=lambda t, x, u, p: x[:1]
     )
     assert str(model.equations()).splitlines()[0] == "d(a)/dt = u + (a + b * 2.0)"
+    summed = gb.model(lambda t, x, u, p: [np.sum(x), np.stack(x)[0]], states=["a", "b"], outputs=["a", "b"], parameters=[])
+    assert str(summed.equations()).splitlines()[:2] == ["d(a)/dt = a + b", "d(b)/dt = a"]
 
 
 REFUSED: list[tuple[Callable[[Any, Any], Any], str]] = [
@@ -148,6 +155,7 @@ REFUSED: list[tuple[Callable[[Any, Any], Any], str]] = [
     (lambda x, u: (x > 0) + 1, "gb.where(condition, 1.0, 0.0)"),
     (lambda x, u: x * (x > 0), "gb.where(condition, 1.0, 0.0)"),
     (lambda x, u: (x > 0) & x, "in parentheses"),
+    (lambda x, u: (x > 0) == 1.0, "in parentheses"),
     (lambda x, u: gb.where(x, 1, 2), "compare it with a number"),
     (lambda x, u: np.rint(x), "np.rint is not known"),
     (lambda x, u: np.add.reduce(x), "np.add.reduce"),

@@ -11,8 +11,7 @@ pub(super) enum Degree {
 }
 
 /// The degree of each node in the quantities that are asked for.
-pub(super) fn degrees(graph: &Graph, of: &dyn Fn(Leaf) -> bool) -> Vec<Degree> {
-    let counts = of;
+pub(super) fn degrees(graph: &Graph, counts: &dyn Fn(Leaf) -> bool) -> Vec<Degree> {
     let mut degrees: Vec<Degree> = Vec::with_capacity(graph.len());
     for node in graph.nodes() {
         let of = |id: Id| degrees[id.index()];

@@ -75,12 +75,12 @@ impl Linear {
         let a = Jacobian::of(graph, &roots.state, states);
         let diffusion = (!roots.diffusion.is_empty()).then(|| graph.pruned(&roots.diffusion));
         let mut linear = Linear { a, diffusion, states, parameters, entries: vec![] };
-        linear.entries = linear.entries();
+        linear.entries = linear.found();
         linear
     }
 
     /// The entries that are not always zero, with the parameters that move them.
-    fn entries(&self) -> Vec<Entry> {
+    fn found(&self) -> Vec<Entry> {
         let n = self.states;
         let of_a: Vec<Option<Vec<bool>>> =
             self.a.entries.iter().map(|root| moving(&self.a.graph, *root, self.parameters)).collect();
@@ -94,20 +94,23 @@ impl Linear {
             }
         }
         // The parameters of what lies between the state `j` and the state `i`.
-        let between = |i: usize, j: usize| {
+        let between = |(i, j): (usize, usize)| {
             let on_the_way = (0..n * n).filter(|at| reaches[i * n + at / n] && reaches[at % n * n + j]);
             joined(self.parameters, on_the_way.filter_map(|at| of_a[at].as_ref()))
         };
+        let between: Vec<Vec<bool>> = (0..n * n).map(|at| between((at / n, at % n))).collect();
         let mut found = vec![];
         for part in [Part::Kept, Part::Constant, Part::Ramp] {
-            found.extend((0..n * n).filter(|at| reaches[*at]).map(|at| (part, at, between(at / n, at % n))));
+            found.extend((0..n * n).filter(|at| reaches[*at]).map(|at| (part, at, between[at].clone())));
         }
         for i in 0..n {
             for j in i..n {
                 let noises = (0..n).filter(|k| reaches[i * n + k] && reaches[j * n + k]);
                 let moved: Vec<Vec<bool>> = noises
                     .filter_map(|k| {
-                        level(k).map(|own| joined(self.parameters, [&own, &between(i, k), &between(j, k)].into_iter()))
+                        level(k).map(|own| {
+                            joined(self.parameters, [&own, &between[i * n + k], &between[j * n + k]].into_iter())
+                        })
                     })
                     .collect();
                 if !moved.is_empty() {

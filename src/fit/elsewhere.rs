@@ -191,9 +191,9 @@ impl Problem<'_> {
     }
 
     /// Further searches where an estimate leaves an output unexplained: in stages, and from further starts where the errors of the minimum that the
-    /// stages lead to are not near the noise, unless records are long. They run by the default method; the best minimum goes on by finer ones where only the step
-    /// is wrong with it. `None` where stages or a number of starts were asked for, where the measurements tell nothing by any parameters, and
-    /// where the variance is predicted: that likelihood has no bound at noise levels of zero, which some start would find.
+    /// stages lead to are not near the noise, unless records are long. They run by the default method; the best minimum goes on by finer ones
+    /// where only the step is wrong with it. `None` where stages or a number of starts were asked for, where the measurements tell nothing by any
+    /// parameters, and where the variance is predicted: that likelihood has no bound at noise levels of zero, which some start would find.
     pub(super) fn search_further(&self, found: &Summary, control: &Control) -> Option<Further> {
         let hopeless = [WarningCode::ConstantOutput, WarningCode::TooFewMeasurements];
         let predicted = self.settings.noise == Noise::Predicted;
@@ -234,9 +234,11 @@ impl Problem<'_> {
         }
     }
 
-    /// Whether the errors of an estimate are near the noise of the measurements, those of each output.
+    /// Whether the errors of an estimate are near the noise of the measurements, those of each output that moves.
     fn is_near_noise(&self, found: &Summary) -> bool {
-        let near = |(output, moves): (&OutputEstimate, &Moves)| output.fit.rmse <= EXPLAINS * moves.level();
+        let near = |(output, moves): (&OutputEstimate, &Moves)| {
+            moves.half == 0.0 || output.fit.rmse <= EXPLAINS * moves.level()
+        };
         self.movement().is_ok_and(|movement| found.outputs.iter().zip(&movement.outputs).all(near))
     }
 
@@ -266,14 +268,18 @@ pub(super) fn leaves_unexplained(found: &Summary) -> bool {
     found.severity() == Severity::NotUsable && found.warnings.iter().any(unexplained)
 }
 
-/// Whether the estimate from the end of stages replaces that of further starts: that is not usable, and it is usable, or explains all outputs where the
-/// other does not or has errors of half the size. A smaller difference may come from the step of the integrator.
+/// Whether the estimate from the end of stages replaces that of further starts. Of two usable ones, the lower one is taken, and a usable one before
+/// another. Where neither is, it has to explain all outputs where the other does not, or have errors of half the size: a smaller difference may
+/// come from the step of the integrator.
 fn is_found(staged: &Summary, again: &Summary) -> bool {
+    let usable = |found: &Summary| found.severity() < Severity::NotUsable;
     let halved = 4f64.ln() * staged.measurements as f64;
-    let lower = || staged.deviance.zip(again.deviance).is_some_and(|(staged, again)| staged < again - halved);
-    again.severity() == Severity::NotUsable
-        && (staged.severity() < Severity::NotUsable
-            || !leaves_unexplained(staged) && (leaves_unexplained(again) || lower()))
+    let lower = |by: f64| staged.deviance.zip(again.deviance).is_some_and(|(staged, again)| staged <= again - by);
+    match (usable(staged), usable(again)) {
+        (true, true) => lower(-SAME),
+        (false, false) => !leaves_unexplained(staged) && (leaves_unexplained(again) || lower(halved)),
+        (staged, _) => staged,
+    }
 }
 
 /// Whether further searches found a better estimate: one that explains all outputs, or one of no higher deviance. The first search had more
@@ -306,6 +312,24 @@ mod tests {
         assert!(!is_better(&unended, &found) && is_better(&of(-1.0), &unended));
         // A higher one that explains the output is better all the same: without its warnings it is usable.
         assert!(is_better(&Summary { warnings: vec![], ..of(1.0) }, &found));
+    }
+
+    /// Of two usable minima the lower one is taken; a usable one is taken before another, whatever their deviances.
+    #[test]
+    fn the_better_one_of_stages_and_starts() {
+        let inputs: Vec<Voltage> = (0..40).map(|k| Voltage { u: f64::from(k * 37 % 21) - 10.0 }).collect();
+        let noise = |k: usize| f64::from(k as u32 * 11 % 17) / 17.0 - 0.5;
+        let outputs = inputs.iter().enumerate().map(|(k, u)| Current { i: 2.0 * u.u + noise(k) }).collect();
+        let record = Experiment::new(&Line, Time::Uniform { start: 0.0, step: 1.0 }, inputs, outputs).unwrap();
+        let found = Fit::new(&Line, &record).parameters(Gain { a: free(1.0) }).run().unwrap().summary().clone();
+        assert!(found.severity() < Severity::NotUsable, "{found}");
+        let of = |by: f64| Summary { deviance: found.deviance.map(|deviance| deviance + by), ..found.clone() };
+        assert_eq!([-1.0, 0.0, 1.0].map(|by| is_found(&of(by), &found)), [true, true, false]);
+        let text = "an output is not explained".to_owned();
+        let wrong = Warning::new(WarningCode::Unexplained, Severity::NotUsable, text).about(About::Output(0));
+        let unusable = |by: f64| Summary { warnings: vec![wrong.clone()], ..of(by) };
+        assert!(is_found(&of(100.0), &unusable(0.0)) && !is_found(&unusable(-100.0), &found));
+        assert!(!is_found(&unusable(-100.0), &unusable(0.0)));
     }
 
     /// At least 100 steps, three times 50 or 60, as far as 200 leave them: 150 after 50, 140 after 60, none after 200.

@@ -9,6 +9,8 @@ pub(super) const LEAST_NOISE: f64 = 1e-6;
 const LEAST_ERROR: f64 = 0.01;
 /// Errors are near the noise where their root mean square is at most so many times the noise.
 pub(super) const EXPLAINS: f64 = 1.5;
+/// Errors above this part of half the range explain nothing of an output.
+pub(super) const UNEXPLAINED: f64 = 0.5;
 /// Predictions are near the measurements where their error is at most so many times the noise. If those from the start are not, the first memory is
 /// shorter.
 pub(super) const NEAR: f64 = 5.0;
@@ -16,7 +18,9 @@ pub(super) const NEAR: f64 = 5.0;
 /// The outputs of all records.
 pub(super) struct Movement {
     pub outputs: Vec<Moves>,
-    /// The mean interval of the samples (s).
+    /// The record in which they move the most, by parts of their ranges.
+    pub most: usize,
+    /// The mean interval of its samples (s).
     pub step: f64,
     /// How fast the outputs change: by half their range in the time `1 / rate` (1/s).
     pub rate: f64,
@@ -41,13 +45,27 @@ impl Problem<'_> {
         let moves = |j: usize| Moves::of(self.records.iter().map(|record| (record, &record.outputs()[j])));
         let outputs: Vec<Moves> = (0..layout.outputs.len()).map(moves).collect();
         let rate = outputs.iter().map(|moves| moves.rate).fold(0.0, f64::max);
-        let first = self.records.first().filter(|first| first.len() > 1);
-        let step = first.map_or(0.0, |first| (first.time(first.len() - 1) - first.time(0)) / (first.len() - 1) as f64);
+        let moved = |record: &Record| -> f64 {
+            let parts = outputs.iter().zip(record.outputs()).filter(|(moves, _)| moves.half > 0.0);
+            parts.map(|(moves, channel)| range(&channel.values) / moves.half).sum()
+        };
+        // Of records that move alike, the first one.
+        let all = self.records.iter().map(moved).enumerate().rev();
+        let most = all.max_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |(e, _)| e);
+        let record = self.records.get(most).filter(|record| record.len() > 1);
+        let step = record.map_or(0.0, |one| (one.time(one.len() - 1) - one.time(0)) / (one.len() - 1) as f64);
         if !(rate > 0.0 && rate.is_finite() && step > 0.0) {
             return Err("no output moves");
         }
-        Ok(Movement { outputs, step, rate })
+        Ok(Movement { outputs, most, step, rate })
     }
+}
+
+/// The range of what was measured.
+fn range(values: &[f64]) -> f64 {
+    let measured = values.iter().filter(|y| y.is_finite());
+    let ends = measured.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), y| (a.min(*y), b.max(*y)));
+    (ends.1 - ends.0).max(0.0)
 }
 
 /// Range, noise and rate of change of an output, from its measured samples in all records.
@@ -74,10 +92,6 @@ impl Moves {
             (samples.into_iter().map(|k| channel.values[k]).collect(), length)
         };
         let all: Vec<(Vec<f64>, f64)> = channels.map(measured).collect();
-        let range = |values: &Vec<f64>| {
-            let ends = values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), y| (a.min(*y), b.max(*y)));
-            (ends.1 - ends.0).max(0.0)
-        };
         let half = 0.5 * all.iter().map(|(values, _)| range(values)).fold(0.0, f64::max);
         let mean_square = |differences: &mut dyn Iterator<Item = f64>| {
             let (sum, count) = differences.fold((0.0, 0.0), |(sum, count), d| (sum + d * d, count + 1.0));

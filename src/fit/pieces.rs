@@ -1,14 +1,15 @@
 //! Estimates where multiple shooting follows the measurements and one simulation of a whole record does not.
 
 use super::elsewhere::leaves_unexplained;
-use super::refine::Start;
+use super::refine::{Start, is_only_coarse};
+use super::shooting::Shot;
 use super::staged::note;
 use super::stages::Led;
 use crate::error::Error;
 use crate::estimate::{Summary, Unknown, WarningCode};
 use crate::numeral::number;
 use crate::problem::{Control, Problem, Role};
-use crate::record::Record;
+use crate::record::{Initial, Record};
 use crate::severity::Severity;
 use std::time::Instant;
 
@@ -23,8 +24,7 @@ impl Problem<'_> {
     /// which an estimate is usable, each with an initial state of its own. Its parameters are right, but one simulation of a whole record with them is
     /// not near the measurements for long (it is chaotic, or unstable): the verdict is that of the whole records, and a note has that of the pieces.
     pub(super) fn or_by_pieces(&self, found: Summary, led: Option<&Led>, control: &Control) -> Summary {
-        let explained = led.filter(|led| led.shot.as_ref().is_some_and(|shot| shot.explains()));
-        match explained.filter(|_| leaves_unexplained(&found)) {
+        match led.filter(|led| led.explains() && leaves_unexplained(&found)) {
             Some(led) => self.by_pieces(&found, led, control).unwrap_or(found),
             None => found,
         }
@@ -37,41 +37,77 @@ impl Problem<'_> {
             .iter()
             .any(|unknown| matches!(unknown.role, Role::Parameter(_)) && unknown.experiment.is_some());
         let (shot, begin) = (led.shot.as_ref()?, Instant::now());
+        // No more pieces than there are between nodes.
+        let most = shot.nodes.iter().map(|nodes| nodes.len() + 1).max()?.min(MOST);
         let counts = std::iter::successors(Some(2), |count| Some(2 * count));
-        for count in counts.take_while(|count| *count <= MOST && !own) {
+        for count in counts.take_while(|count| count / 2 < most && !own) {
             if control.stops() {
                 break;
             }
             let begins: Vec<Begin> =
                 shot.nodes.iter().enumerate().flat_map(|(e, nodes)| begins(e, nodes, count)).collect();
-            let (problem, coordinates) = self.cut_at(&begins, &shot.coordinates).ok()?;
-            let start = Start { coordinates, ..Start::declared(&problem) };
-            let Ok(parts) = problem.run_within(begin, control, start) else { continue };
-            if parts.severity() == Severity::NotUsable {
-                continue;
-            }
-            let whole = self.estimate_at(&self.of_pieces(&begins, &parts), "multiple shooting").ok()?;
-            let (evaluations, seconds) =
-                (found.evaluations + parts.evaluations, found.seconds + begin.elapsed().as_secs_f64());
+            let Some((method, problem, parts)) = self.usable(found, (&begins, shot), begin, control) else { continue };
+            let evaluations = found.evaluations + parts.evaluations;
+            let seconds = found.seconds + begin.elapsed().as_secs_f64();
+            // A simulation of a whole record may overflow.
+            let whole = method.estimate_at(&self.of_pieces(&begins, &parts), "multiple shooting");
+            let is_whole = whole.is_ok();
+            let whole = whole.map(|whole| {
+                let staged = found.warnings.iter().filter(|warning| warning.code == WarningCode::Staged).cloned();
+                Summary { warnings: whole.warnings.iter().cloned().chain(staged).collect(), ..whole }
+            });
+            let whole = whole.unwrap_or_else(|_| found.clone());
             let mut whole = Summary { iterations: found.iterations, evaluations, seconds, ..whole };
-            whole.warnings.extend(found.warnings.iter().filter(|warning| warning.code == WarningCode::Staged).cloned());
-            whole.warnings.push(note(said(&parts, problem.records())));
+            whole.warnings.push(note(said(&parts, problem.records(), is_whole)));
             return Some(whole);
         }
         None
     }
 
-    /// The problem of pieces of the records, and the point of this one there.
-    fn cut_at(&self, begins: &[Begin], coordinates: &[f64]) -> Result<(Problem<'_>, Vec<f64>), Error> {
+    /// A usable estimate of pieces by the method of another estimate, or by a finer one where only its step is wrong; with this problem by that method, and
+    /// that of the pieces.
+    fn usable(
+        &self,
+        found: &Summary,
+        (begins, shot): (&[Begin], &Shot),
+        begin: Instant,
+        control: &Control,
+    ) -> Option<(&Problem<'_>, Problem<'_>, Summary)> {
+        for method in self.by_method().skip(found.method.refinement) {
+            let (problem, coordinates) = self.cut_at(begins, &shot.coordinates, method).ok()?;
+            let start = Start { coordinates, ..Start::declared(&problem) };
+            let parts = problem.run_within(begin, control, start).ok()?;
+            if parts.severity() < Severity::NotUsable {
+                return Some((method, problem, parts));
+            }
+            if !is_only_coarse(&parts) || control.stops() {
+                break;
+            }
+        }
+        None
+    }
+
+    /// The problem of pieces of the records by a method, and the point of this one there.
+    fn cut_at<'p>(
+        &'p self,
+        begins: &[Begin],
+        coordinates: &[f64],
+        method: &'p Problem<'p>,
+    ) -> Result<(Problem<'p>, Vec<f64>), Error> {
         let ends = begins.iter().skip(1).map(Some).chain([None]);
         let end = |e: usize, next: Option<&Begin>| match next {
             Some((other, first, _)) if *other == e => *first,
             _ => self.records[e].len(),
         };
-        let pieces = begins.iter().zip(ends).map(|((e, first, _), next)| self.records[*e].slice(*first..end(*e, next)));
-        let pieces: Vec<Record> = pieces.collect::<Result<_, _>>()?;
+        let piece = |((e, first, _), next): (&Begin, Option<&Begin>)| {
+            let piece = self.records[*e].slice(*first..end(*e, next))?;
+            // A later one begins at its node, and not at a measurement.
+            if *first > 0 { piece.initial(Initial::Free) } else { Ok(piece) }
+        };
+        let pieces: Vec<Record> = begins.iter().zip(ends).map(piece).collect::<Result<_, _>>()?;
         let settings = self.settings.beside(self.settings.noise.clone());
-        let problem = Problem::new(self.sweep.clone(), pieces, &self.unknowns.parameters, settings)?;
+        let problem = Problem::new(method.sweep.clone(), pieces, &self.unknowns.parameters, settings)?;
+        let problem = Problem { refines: self.refines, method: method.method, ..problem };
         let of = |i: usize| {
             let unknown = &problem.unknowns.row[i];
             let known = unknown.experiment.map(|piece| &begins[piece]);
@@ -113,7 +149,7 @@ fn begins(e: usize, nodes: &[(usize, Vec<f64>)], count: usize) -> Vec<Begin> {
 }
 
 /// What the pieces say of the parameters.
-fn said(parts: &Summary, pieces: &[Record]) -> String {
+fn said(parts: &Summary, pieces: &[Record], is_whole: bool) -> String {
     let parameters = parts.unknowns.iter().filter(|unknown| matches!(unknown.role, Role::Parameter(_)));
     let one = |unknown: &Unknown| {
         let error =
@@ -122,10 +158,13 @@ fn said(parts: &Summary, pieces: &[Record]) -> String {
     };
     let parameters: Vec<String> = parameters.map(one).collect();
     let (count, longest) = (pieces.len(), pieces.iter().map(Record::len).max().unwrap_or_default());
+    let (cannot, whose) = match is_whole {
+        true => ("does not", format!("The estimate is that of {count} pieces with an initial state each, which are")),
+        false => ("cannot be run", format!("A fit of {count} pieces with an initial state each is")),
+    };
     format!(
-        "multiple shooting follows the measurements, and one simulation of a whole record does not: the plant is chaotic or unstable. The estimate \
-         is that of {count} pieces with an initial state each, which are usable (standard errors: {}); fit pieces of at most {longest} \
-         samples (Experiment::slice) for their verdict, intervals and residuals",
+        "multiple shooting follows the measurements, and one simulation of a whole record {cannot}: the plant is chaotic or unstable. {whose} \
+         usable (standard errors: {}); fit pieces of at most {longest} samples (Experiment::slice) for their verdict, intervals and residuals",
         parameters.join(", ")
     )
 }

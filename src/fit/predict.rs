@@ -1,11 +1,12 @@
 //! Prediction of a record by an estimate, and its states: a fit of the initial state alone.
 
 use super::Fit;
-use super::fittable::{Made, finer, stepping};
+use super::fittable::{Made, crosses, finer};
 use super::search::search;
 use crate::error::Error;
 use crate::estimate::{Estimate, Prediction, StatesOf, Summary};
 use crate::experiment::ExperimentOf;
+use crate::integrate::exact;
 use crate::model::Model;
 use crate::parameter::fixed;
 use crate::problem::{Control, Noise, Objective, Problem, Settings, Simulated};
@@ -86,7 +87,9 @@ impl<M: Model> Fit<'_, M> {
     /// The sweep of this fit, by the method of the estimate, where the fit would have come to it by itself.
     fn sweep_of(&self, estimate: &Estimate<M>) -> Result<Arc<dyn Sweep + '_>, Error> {
         let predictor = self.predictor.as_ref();
-        let stepping = stepping(self.model, self.stepping.as_ref(), predictor, true);
+        // A simulation after a filter that crossed intervals exactly does so, too.
+        let is_exact = crosses(predictor) && estimate.method.integrator == exact().describe(M::KIND);
+        let stepping = self.stepping.clone().or_else(|| is_exact.then(|| self.model.exact()).flatten());
         let sweep = M::sweep(self.model.lent(), stepping.as_ref(), predictor)?;
         let finer = finer(self.model.lent(), stepping.as_ref(), predictor);
         Ok(finer.by_number(estimate.method.refinement).unwrap_or(sweep))

@@ -1,21 +1,18 @@
 //! Multiple shooting for far starts: the records in pieces that begin near the measurements, and continuity asked for step by step.
 
-use super::moves::{EXPLAINS, Movement, NEAR};
+use super::moves::{EXPLAINS, Movement, Moves, NEAR, UNEXPLAINED};
 use crate::numeral::number;
-use crate::optimize::{Domain, LeastSquares, LevenbergMarquardt, Machine, OwnSize, Request, Stop};
+use crate::optimize::{Domain, LeastSquares, LevenbergMarquardt, Machine, Outcome, OwnSize, Request, Stop};
 use crate::problem::{Control, Objective, Problem, Shooting, Whitening};
-use crate::record::Record;
+use crate::record::{Channel, Record};
 use std::fmt;
 
 /// The least samples of a piece.
 const LEAST: usize = 8;
-/// The first pieces are the longest ones, in halvings, whose error from the start is at most this part of half the range: with shorter ones, the
-/// measurements of a piece say less of the parameters.
-const EXPLAINED: f64 = 0.5;
 /// Pieces of half the length follow where an end is not near the noise; so many lengths are tried.
 const LENGTHS: usize = 4;
 /// A search with fixed multipliers ends where the next step would lower the cost by this part. Multipliers that change before, or a penalty that rises,
-/// lead to other minima. After so many trial steps it goes on only if the error of the pieces is below [`EXPLAINED`], up to so many times.
+/// lead to other minima. After so many trial steps it goes on only if the error of the pieces is below [`UNEXPLAINED`], up to so many times.
 const INNER: Stop = Stop { step: 1e-10, gradient: 1e-8, cost: 1e-4, iterations: 100 };
 const PARTS: usize = 5;
 /// The most searches.
@@ -69,8 +66,8 @@ struct Aim<'s> {
     part: f64,
     /// Pieces with a larger misfit explain nothing.
     unexplained: f64,
-    /// The number of measurements.
-    rows: usize,
+    /// The sum of the weights of all measurements of outputs that move.
+    weight: f64,
 }
 
 /// Multiple shooting from a start. The nodes are at first the states of a filter that is near the measurements, or the measured states.
@@ -92,8 +89,15 @@ pub(super) fn shoot(
     let mut length = length.clamp(LEAST, longest / 2);
     let (mut best, mut evaluations): (Option<Shot>, u64) = (None, 0);
     for _ in 0..LENGTHS {
-        let (explained, shooting, x) = aim.explained(length)?;
-        let shot = aim.shot(shooting, x, control).ok_or("its first search came to no end")?;
+        let found = aim.explained(length).and_then(|(explained, shooting, x)| {
+            Ok((explained, aim.shot(shooting, x, control).ok_or("its first search came to no end")?))
+        });
+        let (explained, shot) = match found {
+            Ok(found) => found,
+            Err(_) if best.is_some() => break,
+            Err(_) if control.stops() => return Err("a limit of the fit stopped it"),
+            Err(reason) => return Err(reason),
+        };
         evaluations += shot.evaluations;
         let order = |shot: &Shot| (shot.gap > CLOSED, shot.misfit);
         if best.as_ref().is_none_or(|best| order(&shot) < order(best)) {
@@ -115,22 +119,23 @@ impl<'s> Aim<'s> {
         start: &'s [f64],
         control: &'s Control,
     ) -> Option<Self> {
-        let positive = |value: f64| if value > 0.0 { value } else { 1.0 };
-        let sigma: Vec<f64> = movement.outputs.iter().map(|moves| positive(moves.level())).collect();
+        // An output that does not move has no noise that errors can be compared with: it counts for nothing.
+        let level = |moves: &Moves| if moves.half > 0.0 { moves.level() } else { f64::INFINITY };
+        let sigma: Vec<f64> = movement.outputs.iter().map(level).collect();
         let parts = movement.outputs.iter().zip(&sigma).filter(|(moves, _)| moves.half > 0.0);
         let part = parts.clone().map(|(moves, sigma)| sigma / moves.half).fold(0.0, f64::max);
         let squares = parts.clone().map(|(moves, sigma)| (moves.half / sigma).powi(2)).sum::<f64>();
-        let unexplained = EXPLAINED * (squares / parts.count() as f64).sqrt();
-        let sizes = problem.scales(problem.records.first()?, movement.rate)?.into_iter().map(positive).collect();
-        let outputs = problem.records.iter().flat_map(Record::outputs);
-        let rows = outputs.map(|output| output.values.iter().filter(|y| !y.is_nan()).count()).sum();
+        let unexplained = UNEXPLAINED * (squares / parts.count() as f64).sqrt();
+        let positive = |size: f64| if size > 0.0 { size } else { 1.0 };
+        let sizes = problem.scales(&problem.records[movement.most], movement.rate)?.into_iter().map(positive).collect();
         let objective = problem.in_units(control).with(Whitening::Diagonal(sigma));
-        Some(Aim { objective, filter, start, sizes, part, unexplained, rows })
+        let weight = weight(&objective, &movement.outputs);
+        Some(Aim { objective, filter, start, sizes, part, unexplained, weight })
     }
 
     /// The root of the mean square error of the pieces.
     fn misfit(&self, cost: f64) -> f64 {
-        (2.0 * cost / self.rows.max(1) as f64).sqrt()
+        (2.0 * cost / self.weight).sqrt()
     }
 
     /// Pieces that explain the outputs at the start, of at most so many samples, or the shortest ones.
@@ -166,17 +171,20 @@ impl<'s> Aim<'s> {
         let p = self.objective.problem.unknowns.of_experiment(e, self.start).p;
         let measured = |k: &usize| sweep.measured_state(record, *k, &p);
         let all: Result<Vec<Vec<f64>>, String> = at.iter().map(measured).collect();
-        all.map_err(|_| "outputs do not give the state where pieces begin, and the model is not compiled, so that there is no filter")
+        all.map_err(|_| {
+            "outputs do not give the state where pieces begin, and there is no filter that does (more than six states, steps of the integrator that \
+             depend on the state, or a model that cannot be read as a graph)"
+        })
     }
 
     /// Moves `x` to the least cost with fixed multipliers, and tells whether a limit of trial steps ended the search.
     fn minimized(&self, shooting: &mut Shooting<'_>, x: &mut Vec<f64>, evaluations: &mut u64) -> bool {
         for _ in 0..PARTS {
             shooting.begin_at(x);
-            let (end, count) = minimize(shooting, std::mem::take(x));
+            let (end, outcome, count) = minimize(shooting, std::mem::take(x));
             *x = end;
             *evaluations += count;
-            if count <= INNER.iterations {
+            if !matches!(outcome, Outcome::IterationLimit { .. }) {
                 return false;
             }
             if !shooting.pass(x).is_ok_and(|passed| self.misfit(passed.cost) <= self.unexplained) {
@@ -190,12 +198,12 @@ impl<'s> Aim<'s> {
     fn shot(&self, mut shooting: Shooting<'_>, mut x: Vec<f64>, control: &Control) -> Option<Shot> {
         let (mut evaluations, mut before, mut shot) = (0, f64::INFINITY, None);
         let (mut least, mut stuck) = (f64::INFINITY, 0);
-        for _ in 0..ROUNDS {
+        for round in 1..=ROUNDS {
             let limited = self.minimized(&mut shooting, &mut x, &mut evaluations);
-            if shooting.is_stopped(&x) && !control.stops() {
+            if shooting.is_stopped(&x) && round < ROUNDS && !control.stops() {
                 continue;
             }
-            let passed = shooting.pass(&x).ok()?;
+            let Ok(passed) = shooting.pass(&x) else { break };
             let gap = passed.gaps.iter().fold(0.0, |most: f64, gap| most.max(gap.abs())) / self.part;
             let misfit = self.misfit(passed.cost);
             let coordinates = shooting.coordinates(&x);
@@ -224,8 +232,22 @@ impl<'s> Aim<'s> {
     }
 }
 
-/// The end of a search for the least cost with fixed multipliers, and its evaluations.
-fn minimize(shooting: &Shooting<'_>, start: Vec<f64>) -> (Vec<f64>, u64) {
+/// The sum of the weights of all measurements of outputs that move.
+fn weight(objective: &Objective<'_>, outputs: &[Moves]) -> f64 {
+    let records = objective.problem.records.iter().enumerate();
+    let moving = records.flat_map(|(e, record)| {
+        let channels = record.outputs().iter().zip(outputs).filter(|(_, moves)| moves.half > 0.0);
+        channels.map(move |(channel, _)| (e, channel))
+    });
+    let of = |(e, channel): (usize, &Channel)| -> f64 {
+        let measured = (0..channel.values.len()).filter(|k| !channel.values[*k].is_nan());
+        measured.map(|k| objective.weight(e, k)).sum()
+    };
+    moving.map(of).sum()
+}
+
+/// The end of a search for the least cost with fixed multipliers, its outcome, and its evaluations.
+fn minimize(shooting: &Shooting<'_>, start: Vec<f64>) -> (Vec<f64>, Outcome, u64) {
     let mut search = LevenbergMarquardt::new(INNER, OwnSize);
     search.begin(start, Domain::of(shooting));
     let mut evaluations = 0;
@@ -240,7 +262,7 @@ fn minimize(shooting: &Shooting<'_>, start: Vec<f64>) -> (Vec<f64>, u64) {
                 let answer = shooting.curvature(x, along);
                 search.tell_curvature(answer);
             }
-            Request::Ended(_) => return (search.place().to_vec(), evaluations),
+            Request::Ended(outcome) => return (search.place().to_vec(), outcome, evaluations),
         }
     }
 }

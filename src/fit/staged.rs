@@ -5,6 +5,7 @@ use super::refine::{Start, is_only_coarse};
 use super::stages::Led;
 use crate::error::Error;
 use crate::estimate::{About, Summary, Warning, WarningCode};
+use crate::optimize::{Infeasible, LeastSquares};
 use crate::problem::{Control, Lead, Problem, SearchPlan, Settings};
 use crate::severity::Severity;
 use std::time::Instant;
@@ -26,11 +27,23 @@ impl Problem<'_> {
                 (declared, format!("{asked}: each search began at {its} end, if that is nearer to the measurements"))
             }
             Ok((false, stages)) => match stages.declared(control) {
+                Ok((start, led)) if self.is_failing(&start, control) => {
+                    let text = format!(
+                        "no simulation can be run from the end of {}: the plant is unstable or chaotic; the search began at the declared start",
+                        led.path()
+                    );
+                    (Start { stages: start.stages, ..declared }, text)
+                }
                 Ok((start, led)) => (start, format!("the search began at the end of {}", led.path())),
                 Err(reason) => (declared, format!("{asked}, but {reason}; the search began at the declared start")),
             },
         };
         (start, Some(note(text)))
+    }
+
+    /// Whether a simulation from there fails, or one of its slopes.
+    fn is_failing(&self, start: &Start, control: &Control) -> bool {
+        matches!(self.in_units(control).linearize(&start.coordinates), Err(Infeasible::Failed(_)))
     }
 
     /// The estimate, or that from the end of stages where the declared start cannot be simulated.
@@ -81,7 +94,7 @@ pub(super) fn note(text: String) -> Warning {
 pub(super) fn after_stages(found: Summary, led: Option<&Led>) -> Summary {
     let Some(led) = led else { return found };
     let mut found = Summary { evaluations: found.evaluations + led.evaluations, ..found };
-    let explained = led.follows || led.shot.as_ref().is_some_and(|shot| shot.explains());
+    let explained = led.follows || led.explains();
     if led.stages > 0 && !explained && leaves_unexplained(&found) {
         let text = "predictions of a filter that corrects the state at each sample follow the measurements where this search began, and a simulation \
                     does not: the plant may be unstable, chaotic or disturbed; take Kalman, with Model::diffusion and Model::noise";

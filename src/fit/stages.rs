@@ -5,7 +5,7 @@
 //! error of the parameters accumulates over that time only: with a short memory the predictions are nearly linear in the parameters. With a long
 //! one the parameters have smaller variances, and less bias by the noise of the measurements.
 
-use super::moves::{LEAST_NOISE, Movement, Moves, NEAR};
+use super::moves::{LEAST_NOISE, Movement, Moves, NEAR, UNEXPLAINED};
 use super::refine::Start;
 use super::search::search;
 use super::shooting::{Shot, shoot};
@@ -26,8 +26,6 @@ const TRIALS: u64 = 100;
 const BETTER: f64 = 0.9;
 /// A simulation follows an output where its error is at most so many times that of the predictions.
 const FOLLOWS: f64 = 1.5;
-/// Predictions do not explain an output where their error is above this part of half the range. A longer memory does so still less.
-const UNEXPLAINED: f64 = 0.5;
 /// With more states the program of a stage takes seconds to compile: its carry has `n + n^2` numbers.
 const MOST_STATES: usize = 6;
 
@@ -55,6 +53,11 @@ pub(super) struct Led {
 }
 
 impl Led {
+    /// Whether multiple shooting closed all gaps with errors near the noise.
+    pub fn explains(&self) -> bool {
+        self.shot.as_ref().is_some_and(|shot| shot.explains())
+    }
+
     /// The path, in words.
     pub fn path(&self) -> String {
         let stages = || format!("{} ({STAGES})", counted(self.stages.into(), "stage"));
@@ -89,7 +92,7 @@ impl Problem<'_> {
         Some(errors(self, &self.start(), control)?.into_iter().enumerate().all(explained))
     }
 
-    /// The size of each state: of those that the outputs give, what moves these by half their range; of the others, what moves the derivatives of
+    /// The size of each state in a record: of those that the outputs give, what moves these by half their range; of the others, what moves the derivatives of
     /// states whose size is known by that size in the time `1 / rate`.
     pub(super) fn scales(&self, record: &Record, rate: f64) -> Option<Vec<f64>> {
         let p: Vec<f64> = self.unknowns.parameters.iter().map(|parameter| parameter.start).collect();
@@ -118,7 +121,8 @@ impl Stages<'_> {
     /// is about `part`, so that the influence of a measurement decays in `1 / part` intervals.
     fn problem(&self, memory: f64) -> Option<Problem<'_>> {
         let problem = self.problem;
-        let scales = problem.scales(problem.records.first()?, self.movement.rate.max(memory.recip()))?;
+        let scales =
+            problem.scales(problem.records.get(self.movement.most)?, self.movement.rate.max(memory.recip()))?;
         let part = self.movement.outputs.iter().filter(|moves| moves.half > 0.0).map(|moves| moves.noise / moves.half);
         let part = part.fold(LEAST_NOISE, f64::max) * self.movement.step / memory;
         let positive = |level: f64| if level > 0.0 { level } else { 1.0 };
@@ -170,7 +174,10 @@ impl Stages<'_> {
         let distance = |at: &[f64]| self.distance(at).unwrap_or(f64::INFINITY);
         let few = self.problem.layout().states.len() <= MOST_STATES;
         let filter = few.then(|| self.problem(self.first_memory(&last, control))).flatten();
-        match shoot((self.problem, &self.movement, filter.as_ref()), &last, control) {
+        // It leads a start only, and its errors are compared with the noise, which no robust loss is.
+        let settings = Settings { loss: None, ..self.problem.settings.clone() };
+        let squared = Problem { settings, ..self.problem.clone() };
+        match shoot((&squared, &self.movement, filter.as_ref()), &last, control) {
             Ok(shot) => {
                 let led = Led { evaluations: led.evaluations + shot.evaluations, ..led };
                 let nearest = distance(nearer.as_deref().unwrap_or(start));
@@ -226,6 +233,7 @@ impl Stages<'_> {
             let Some(predicted) = errors(&problem, &coordinates, control) else { break };
             let parts = || predicted.iter().zip(&self.movement.outputs).filter(|(_, moves)| moves.half > 0.0);
             near = parts().all(|(error, moves)| *error <= NEAR * moves.noise);
+            // A longer memory explains still less.
             if parts().any(|(error, moves)| *error > UNEXPLAINED * moves.half) {
                 break;
             }

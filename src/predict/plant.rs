@@ -58,8 +58,9 @@ pub trait Plant<S> {
     fn integrate(&self, z: &mut [S], rate: Rate<'_, S>) -> Result<(), Stuck>;
 
     /// Replaces the covariance of the state at this sample (upper triangle row by row, each entry in the product of its two states' units) by that at
-    /// the next, the process noise of the interval included, and returns true, where equations are linear with constant coefficients and no
-    /// integrator was chosen. Else it returns false, and the covariance is to be [integrated](Plant::integrate).
+    /// the next, the process noise of the interval included, and returns true, where the fit crosses intervals exactly: by the library's own filters of linear equations
+    /// with constant coefficients, where no integrator was chosen. Else it returns false, and the covariance is to be
+    /// [integrated](Plant::integrate).
     fn spread(&self, covariance: &mut [S]) -> bool {
         let _ = covariance;
         false

@@ -9,7 +9,7 @@ use super::linearize::Part;
 use crate::optimize::{Infeasible, LeastSquares};
 use std::ops::Range;
 
-/// The longest way of a logarithm in one search.
+/// The most by which a logarithm changes in one search.
 const LONGEST: f64 = 1.5;
 
 /// Multiple shooting (H. G. Bock and K. J. Plitt, IFAC Proceedings 17 (1984) 1603): the initial states of all pieces but the first of each record
@@ -60,7 +60,7 @@ impl<'p> Shooting<'p> {
         Shooting { objective, pieces, sizes, penalty, multipliers: vec![0.0; gaps], begins, bounds: objective.bounds() }
     }
 
-    /// Begins a search at a point: logarithms move by no more than a part of it.
+    /// Begins a search at a point, in which no logarithm changes by more than [`LONGEST`].
     pub fn begin_at(&mut self, x: &[f64]) {
         let (bounds, logarithms) = (self.objective.bounds(), self.objective.logarithms());
         let around = self.coordinates(x).into_iter().zip(logarithms);

@@ -28,6 +28,10 @@ impl Time {
     /// A millionth of a step moves the edge of a held input so little that no answer changes in the digits that are
     /// printed. Clocks that jitter, and stamps printed with too few digits, are off by more and stay stamps.
     pub fn from_stamps(stamps: Vec<f64>) -> Time {
+        // What is no number has no place on a grid; a record with it is refused.
+        if !stamps.iter().all(|stamp| stamp.is_finite()) {
+            return Time::Stamps(stamps);
+        }
         let mut clock = Clock::default();
         for &stamp in &stamps {
             clock.tick(stamp);

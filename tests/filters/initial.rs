@@ -113,6 +113,7 @@ fn likelihoods_by_exact_transitions() {
         let record = record::<false>(Time::Uniform { start: 0.0, step }, samples);
         let fit = || Fit::new(&Heated::<false>, &record).parameters(start());
         agrees(fit().predictor(Kalman), &record, |plant| plant.p0.clone(), 1e-11);
+        agrees(fit().predictor(SecondOrder), &record, |plant| plant.p0.clone(), 1e-11);
         agrees(fit().predictor(Kalman::starting(InitialCovariance::Stationary)), &record, at_rest, 1e-11);
         let first = |plant: &Plant<D>| plant.over(step).noise;
         agrees(fit().predictor(Kalman::starting(InitialCovariance::FirstInterval)), &record, first, 1e-11);

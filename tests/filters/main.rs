@@ -3,6 +3,7 @@
 mod affine;
 #[path = "../common/mod.rs"]
 mod common;
+mod crossed;
 mod extended;
 mod given_noise;
 #[path = "../common/hardening.rs"]
@@ -15,4 +16,5 @@ mod second_order;
 mod simulated;
 mod simulates;
 mod smoothed;
+mod two_sensors;
 mod walls;

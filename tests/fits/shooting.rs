@@ -95,6 +95,69 @@ fn stages_end_with_multiple_shooting() {
     assert!(said(&found).contains("less in each stage), then of multiple shooting ("), "{found}");
 }
 
+/// Weights have no unit: the same parameters come of them, and the same error in units of the noise, 0.9 to 1.2 of it.
+#[test]
+fn weights_do_not_change_what_the_noise_is() {
+    let record = lorenz(20);
+    for weight in [1e-4, 300.0] {
+        let fit = Fit::new(&Lorenz, &record).parameters(off()).integrator(STEPS);
+        let found = fit.weighting(move |_: &Sample<Lorenz>| weight).multiple_shooting().run().unwrap();
+        assert!((found.parameters.sigma / 10.0 - 1.0).abs() < 0.01, "{found}");
+        let note = said(&found);
+        let misfit = note.split("the rms error ").nth(1).and_then(|rest| rest.split(')').next()).unwrap();
+        assert!((0.9..1.2).contains(&misfit.parse().unwrap()), "{note}");
+    }
+}
+
+signals! { struct Tilt { x: "rad" } }
+signals! { struct Drive { u: "rad/s" } }
+signals! { struct Growth { a: "1/s", b: "1" } }
+
+/// A plant that falls over.
+#[derive(Clone)]
+struct Pole;
+
+impl Model for Pole {
+    type State = Tilt;
+    type Input = Drive;
+    type Output = Tilt;
+    type Parameters = Growth;
+
+    fn derivative<S: Scalar>(&self, _t: S, x: &Tilt<S>, u: &Drive<S>, p: &Growth<S>) -> Tilt<S> {
+        Tilt { x: p.a * x.x + p.b * u.u }
+    }
+
+    fn output<S: Scalar>(&self, _t: S, x: &Tilt<S>, _u: &Drive<S>, _p: &Growth<S>) -> Tilt<S> {
+        *x
+    }
+}
+
+/// A plant that grows by `exp(750)` in the record of its controlled course: no simulation of the whole with the right parameters is a number. The fit
+/// goes on from its start, is not usable, and has a note with the parameters that pieces give, which its remedy confirms.
+#[test]
+fn a_plant_whose_simulation_overflows_is_known_by_pieces() {
+    const H: f64 = 0.05;
+    let (a, mut random, mut x) = (5.0f64, Noise(5), 0.0);
+    let (mut inputs, mut outputs) = (vec![], vec![]);
+    for k in 0..3000 {
+        let y = x + 0.01 * random.gauss();
+        let u = if k / 40 % 2 == 0 { 1.0 } else { -1.0 } - 8.0 * y;
+        x = f64::exp(a * H) * x + f64::exp_m1(a * H) / a * u;
+        inputs.push(Drive { u });
+        outputs.push(Tilt { x: y });
+    }
+    let record = Experiment::new(&Pole, Time::Uniform { start: 0.0, step: H }, inputs, outputs).unwrap();
+    let start = || Growth { a: free(-1.0), b: free(0.5) };
+    let fit = Fit::new(&Pole, &record).parameters(start()).integrator(STEPS).multiple_shooting();
+    let found = fit.run().unwrap();
+    let note = said(&found);
+    assert_eq!(found.severity(), Severity::NotUsable, "{found}");
+    assert!(note.contains("no simulation can be run from the end of multiple shooting ("), "{note}");
+    assert!(note.contains("one simulation of a whole record cannot be run"), "{note}");
+    let value: f64 = note.split("`a` = ").nth(1).and_then(|rest| rest.split(' ').next()).unwrap().parse().unwrap();
+    assert!((value - a).abs() < 0.1, "{note}");
+}
+
 /// The flow with equations that are not read as a graph, so that there is no filter.
 #[derive(Clone)]
 struct Unread;

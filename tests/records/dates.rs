@@ -118,6 +118,11 @@ fn daylight_saving_is_followed_or_named() {
     };
     says(autumn().read(&Pmsm), &["line 4", "2400 s before the row above", "daylight saving ends", "DataFile::zone"]);
     assert_eq!(times(autumn().zone("Europe/Berlin").read(&Pmsm)), [0.0, 1200.0, 2400.0, 6000.0]);
+    // Each hour, the time of the second row after the change is that of the one before.
+    let hours =
+        || file("hours", "t", &["2025-10-26 01:00", "2025-10-26 02:00", "2025-10-26 02:00", "2025-10-26 03:00"]);
+    assert_eq!(times(hours().zone("Europe/Berlin").read(&Pmsm)), [0.0, 3600.0, 7200.0, 10800.0]);
+    says(hours().read(&Pmsm), &["line 4", "it is the time of the row above", "daylight saving ends", "DataFile::zone"]);
     let lost = file("lost", "t", &["2025-03-30 02:30:00", "2025-03-30 03:00:00"]).zone("Europe/Berlin");
     says(lost.read(&Pmsm), &["line 2", "no such time in the zone"]);
     says(spring().zone("Middle/Earth").read(&Pmsm), &["DataFile::zone(\"Middle/Earth\")"]);

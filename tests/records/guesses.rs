@@ -122,6 +122,8 @@ fn a_column_in_another_unit_is_refused() {
         says(DataFile::new(&path).read(&Pmsm), &[&format!("column `{column}`"), factor]);
     }
     let path = file("units", "t,ud,w [rpm],id,iq\n0,1,2,3,4\n1,1,2,3,4\n");
+    // Also where the column is named with its unit.
+    says(DataFile::new(&path).column("w", "w [rpm]").read(&Pmsm), &["column `w [rpm]`", "0.10471975511965977"]);
     assert_eq!(DataFile::new(path).factor("w", 0.5).read(&Pmsm).unwrap().input(0).w, 1.0);
 }
 

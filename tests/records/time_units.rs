@@ -32,6 +32,25 @@ fn the_unit_of_the_file_is_shown() {
     );
 }
 
+/// Units of time that are not known, and dates that are written as numbers, are refused until a factor is given.
+#[test]
+fn what_is_no_unit_of_time_is_refused() {
+    let read = |name: &str, header: &str, times: &[f64]| DataFile::new(file(name, header, times)).column("t", header);
+    assert_eq!(read("mins", "t (mins)", &TIMES).read(&Pmsm).unwrap().time(1), 60.0);
+    let unknown = || read("unknown", "t [fortnights]", &TIMES);
+    says(unknown().read(&Pmsm), &["column `t [fortnights]`", "DataFile::factor(\"t\""]);
+    assert_eq!(unknown().factor("t", 2.0).read(&Pmsm).unwrap().time(1), 2.0);
+    assert_eq!(read("zone", "t (UTC)", &TIMES).read(&Pmsm).unwrap().time(1), 1.0);
+    for (name, compact) in [("compact", 20_250_320_140_500.0), ("minutes_of_day", 202_503_201_405.0)] {
+        let times: Vec<f64> = (0..3).map(|k| compact + f64::from(k)).collect();
+        says(read(name, "timestamp", &times).read(&Pmsm), &["dates that are written as numbers", "2025-03-20"]);
+    }
+    // Milliseconds since 1970.
+    let now: Vec<f64> = (0..3).map(|k| 1_742_479_500_000.0 + f64::from(k)).collect();
+    assert!((read("epoch", "timestamp", &now).read(&Pmsm).unwrap().time(1) - 1e-3).abs() < 1e-12);
+    says(read("serial", "date", &[45_736.0, 45_737.0]).read(&Pmsm), &["column `date`", "written as numbers"]);
+}
+
 /// The unit is that of the numbers where these are not converted, and that of the factor where the file names none.
 #[test]
 fn a_factor_decides_the_unit() {

@@ -179,7 +179,7 @@ fn expressions() {
 fn kinds_and_what_is_declared() {
     let discrete = model(
         "greybox = 1\noutputs = [\"x\"]\n[parameters]\na = { start = 0.5, log = true, prior = { mean = 0.4, sd = 0.1 } }\n\
-         b = { fixed = 2 }\nq = { start = 0.1, per_experiment = true }\n[inputs]\nu = { unit = \"V\", hold = \"linear\" }\n\
+         b = { fixed = 2 }\nq = { start = 0.1, per_experiment = true }\n[inputs]\nu = { unit = \"V\", hold = \"first\" }\n\
          [states]\nx = { next = \"a*x + b*u\", initial = 0.3, diffusion = \"q\", initial_noise = \"2*q\" }\nz = { next = \"z\", initial = { start = 1, within = [0, 2] } }",
     );
     assert_eq!(discrete.equations().layout().kind, Kind::Discrete);

@@ -29,7 +29,7 @@ const CASES: &[Case] = &[
     ("positive = true", "positive = 1", "`positive` is a number, where true or false should stand", (12, 45), ""),
     ("start = 0.7 }", "start = -0.7, log = true }", "parameter `ke` is -0.7; a logarithm needs a positive start", (13, 40), ""),
     ("start = 0.7 }", "start = 0.7, prior = { mean = 1 } }", "the prior of parameter `ke` needs `mean` and a positive `sd`", (13, 47), ""),
-    ("hold = \"zero\"", "hold = \"cubic\"", "there is no hold `cubic`", (7, 27), "\"zero\": constant from sample to sample; \"linear\": a straight line to the next sample"),
+    ("hold = \"zero\"", "hold = \"cubic\"", "there is no hold `cubic`", (7, 27), "\"zero\": constant from sample to sample; \"first\": a straight line to the next sample"),
     ("[outputs]", "[solver]\nintegrator = \"rk5\"\n[outputs]", "there is no integrator `rk5`", (20, 14), ""),
     ("unit = \"1\"", "unit = \"V/\"", "the unit ends where a symbol should follow", (5, 26), ""),
     ("np = {", "id = {", "`id` is a state and a constant", (17, 1), "rename one"),

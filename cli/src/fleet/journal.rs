@@ -20,8 +20,8 @@ impl Journal {
     /// Opens the journal, and reads the rows that an earlier run left there.
     ///
     /// # Errors
-    /// A file that cannot be written; one of another table; one that another process writes.
-    pub fn open(path: &Path, header: &[String]) -> Result<(Self, Vec<Row>), Failure> {
+    /// A file that cannot be written; one of another table, or of rows that were made by something else; one that another process writes.
+    pub fn open(path: &Path, header: &[String], made_by: &str) -> Result<(Self, Vec<Row>), Failure> {
         let failed = |error: std::io::Error| format!("{}: {error}", path.display());
         let mut file =
             OpenOptions::new().read(true).write(true).create(true).truncate(false).open(path).map_err(failed)?;
@@ -35,12 +35,16 @@ impl Journal {
         file.set_len(whole as u64).map_err(failed)?;
         file.seek(SeekFrom::End(0)).map_err(failed)?;
         let mut journal = Journal { path: path.to_owned(), file };
-        let other = || format!("{}: it is of another table; remove it, or name another table", path.display());
+        let of = |what: &str| format!("{}: it is of {what}; remove it, or name another table", path.display());
+        let other = || of("another table");
         let mut lines = bytes[..whole].split_inclusive(|byte| *byte == b'\n');
         match lines.next() {
-            None => journal.write(&header)?,
-            Some(line) if serde_json::from_slice::<Vec<String>>(line).is_ok_and(|found| found == header) => {}
-            Some(_) => return Err(other().into()),
+            None => journal.write(&(header, made_by))?,
+            Some(line) => match serde_json::from_slice::<(Vec<String>, String)>(line) {
+                Ok((names, by)) if names == header && by == made_by => {}
+                Ok((names, _)) if names == header => return Err(of("another model, or other options").into()),
+                _ => return Err(other().into()),
+            },
         }
         let row = |line| {
             let (record, group, verdict, numbers, remarks) = serde_json::from_slice::<Line>(line).ok()?;
@@ -83,8 +87,10 @@ mod tests {
         let numbers = vec![Some(0.1), None, Some(f64::NEG_INFINITY), Some(f64::INFINITY)];
         let name = Name { record: "a.csv".to_owned(), group: None };
         let row = Row { name, verdict: "usable".to_owned(), numbers, remarks: String::new() };
-        Journal::open(&path, &header).unwrap().0.add(&row).unwrap();
-        let (journal, rows) = Journal::open(&path, &header).unwrap();
+        Journal::open(&path, &header, "a").unwrap().0.add(&row).unwrap();
+        let error = Journal::open(&path, &header, "b").err().unwrap().to_string();
+        assert!(error.contains("another model, or other options"), "{error}");
+        let (journal, rows) = Journal::open(&path, &header, "a").unwrap();
         assert_eq!(rows, [row]);
         journal.remove().unwrap();
     }

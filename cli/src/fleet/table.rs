@@ -17,11 +17,11 @@ pub struct Table {
 }
 
 impl Table {
-    /// An empty table, or that of earlier runs: what a finished one has written, then what an unfinished one has done.
+    /// An empty table, or that of earlier runs: what a finished one has written, then what an unfinished one has done by the same model and options.
     ///
     /// # Errors
     /// A file that is something else, or cannot be written.
-    pub fn open(path: Option<&Path>, header: Header) -> Result<Self, Failure> {
+    pub fn open(path: Option<&Path>, header: Header, made_by: &str) -> Result<Self, Failure> {
         let mut table = Table { header, rows: vec![], path: path.map(Path::to_owned), journal: None };
         let Some(path) = path else { return Ok(table) };
         if output::ending(path) == "parquet" && cfg!(not(feature = "arrow")) {
@@ -35,7 +35,7 @@ impl Table {
         if path.is_file() {
             table.rows = table.read(path).map_err(|error| format!("{}: {error}", path.display()))?;
         }
-        let (journal, rows) = Journal::open(&beside(path, ".journal"), &table.header.names)?;
+        let (journal, rows) = Journal::open(&beside(path, ".journal"), &table.header.names, made_by)?;
         // A run that was killed between writing the table and removing its journal has the rows twice.
         let there: HashSet<_> = table.rows.iter().map(|row| row.name.clone()).collect();
         table.rows.extend(rows.into_iter().filter(|row| !there.contains(&row.name)));

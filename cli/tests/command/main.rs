@@ -137,6 +137,40 @@ fn a_project_file_repeats_a_fit() {
     assert!(error.contains("greybox.toml: there is no option `los`"), "{error}");
 }
 
+/// Options mean what they mean in `fit` and `fleet`; a comparison takes those of its fits; help is none of its words.
+#[test]
+fn a_project_file_is_for_fits() {
+    let bench = Bench::new();
+    let project = "model = 'pmsm.toml'\nrecords = ['record.csv']\nnoise = { id = 0.05, iq = 0.05 }\nout = 'motors.csv'\nloss = 'huber'\n";
+    std::fs::write(bench.path("greybox.toml"), project).unwrap();
+    let (out, _) = bench.ends(0, &["export", "pmsm.toml", "--language", "latex"]);
+    assert!(out.contains('\\') && !bench.path("motors.csv").exists(), "{out}");
+    let words = ["simulate", "pmsm.toml", "record.csv", "--fix", "rs=0.63", "--fix", "ls=4e-3", "--fix", "ke=0.95"];
+    let (with, _) = bench.ends(0, &words);
+    let (help, _) = bench.ends(0, &["help", "fit"]);
+    assert!(help.contains("--loss"), "{help}");
+    let compared = ["compare", "--model", "pmsm.toml", "record.csv", "--report", "c.html"];
+    bench.ends(0, &compared);
+    assert!(std::fs::read_to_string(bench.path("c.html")).unwrap().contains("Huber"));
+    std::fs::remove_file(bench.path("greybox.toml")).unwrap();
+    let (without, _) = bench.ends(0, &words);
+    assert!(with == without && with.lines().count() == 2001, "{}", with.lines().count());
+}
+
+/// Before the work, not after it.
+#[test]
+fn files_that_cannot_be_written_are_named_at_once() {
+    let bench = Bench::new();
+    for (option, path, says) in [
+        ("--json", "nowhere/e.json", "no such folder"),
+        ("--report", "r.pdf", "take .html, .md, .json, .txt"),
+        ("--plot", "p.jpg", "take .svg"),
+    ] {
+        let (out, error) = bench.ends(1, &["fit", "pmsm.toml", "record.csv", option, path]);
+        assert!(out.is_empty() && error.contains(path) && error.contains(says), "{out} {error}");
+    }
+}
+
 #[test]
 fn a_simulation_is_a_record_that_gives_its_parameters_back() {
     let bench = Bench::new();
@@ -186,6 +220,10 @@ fn estimates_are_examined_and_compared() {
     assert!(out.contains("esiduals"), "{out}");
     let (out, _) = bench.ends(0, &["bootstrap", "pmsm.toml", "record.csv", "--estimate", "e.json", "--refits", "20"]);
     assert!(out.contains("20"), "{out}");
+    let renamed = MODEL.replace("rs = {", "resistance = {").replace("rs*", "resistance*");
+    std::fs::write(bench.path("renamed.toml"), renamed).unwrap();
+    let (_, error) = bench.ends(1, &["compare", "--model", "renamed.toml:e.json", "record.csv"]);
+    assert!(error.contains("of a model with other parameters"), "{error}");
     std::fs::write(bench.path("wrong.toml"), MODEL.replace("we*iq", "0.5*we*iq")).unwrap();
     let words = ["compare", "--model", "pmsm.toml:e.json", "--model", "wrong.toml", "record.csv", "--report", "c.html"];
     let (out, _) = bench.ends(0, &words);

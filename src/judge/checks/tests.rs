@@ -43,8 +43,8 @@ fn page() -> String {
     page += &match flagged["all"] {
         0 => "How many good records of the table of verdicts each code was said of is not measured yet".to_owned(),
         all => format!(
-            "Behind each code stands of how many of {all} good records of the table of verdicts it was said as a reason for care, or against \
-             the estimate; notes do not count, and a code of several checks has one number"
+            "The number after a code says for how many of {all} good records of the table of verdicts it was a reason for care or for not \
+             usable; notes do not count, and a code of several checks has one number"
         ),
     };
     page += " (`GREYBOX_WRITE_CHECKS=1 cargo test --release --test verdicts good` measures that).\n";

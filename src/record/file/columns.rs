@@ -23,6 +23,12 @@ pub(super) trait Columns {
     /// The names of its columns.
     fn names(&self) -> &[String];
 
+    /// The unit of a column, if the file says one.
+    fn unit(&self, column: usize) -> Option<&str> {
+        let _ = column;
+        None
+    }
+
     /// Reads some of the columns, and one more whose cells are texts, to group by.
     ///
     /// # Errors

@@ -151,7 +151,8 @@ impl Way {
         self.later(seconds, "; sort the record")
     }
 
-    /// In a zone an hour occurs twice where clocks are set back: it is the second where time would not increase.
+    /// In a zone an hour occurs twice where clocks are set back: it is the second where time would run backwards, or, of samples an hour apart, stand
+    /// still.
     fn zoned(&mut self, local: DateTime, zone: &TimeZone) -> Result<(), String> {
         let found = zone.to_ambiguous_timestamp(local);
         if let AmbiguousOffset::Gap { .. } = found.offset() {
@@ -159,11 +160,18 @@ impl Way {
         }
         let instants = [found.earlier(), found.later()].map(|instant| instant.map_err(|error| error.to_string()));
         let [earlier, later] = instants;
-        let seconds = self.since(earlier?);
-        if seconds >= self.last() {
+        let (earlier, later) = (earlier?, later?);
+        let shift = (later.as_nanosecond() - earlier.as_nanosecond()) as f64 / 1e9;
+        let seconds = self.since(earlier);
+        if seconds > self.last() || seconds == self.last() && !self.repeats(shift) {
             return self.later(seconds, "");
         }
-        self.instant(later?)
+        self.instant(later)
+    }
+
+    /// Whether a row of the same time as the last one is that of clocks that were set back by so much: samples so far apart, each at an instant of its own.
+    fn repeats(&self, shift: f64) -> bool {
+        shift > 0.0 && self.step_before() == Some(shift) && self.seconds.is_sorted_by(|a, b| a < b)
     }
 
     /// Without a zone a clock that is set back or forward is not followed, and named.
@@ -180,6 +188,9 @@ impl Way {
             return Err(format!(
                 "the clock is an hour ahead of the rows above, as where daylight saving begins: {remedy}"
             ));
+        }
+        if changed && step == 0.0 && self.repeats(HOUR) {
+            return Err(format!("it is the time of the row above, as where daylight saving ends: {remedy}"));
         }
         if changed && step < 0.0 && -step <= HOUR {
             return self.later(seconds, &format!(", as where daylight saving ends: {remedy}"));

@@ -40,7 +40,7 @@ impl DataFile {
     pub fn read_groups(&self, layout: &Layout, by: &str) -> Result<Groups<Record>, Error> {
         self.check(layout)?;
         let Some(mut file) = columns::open(self)? else { return self.text_groups(layout, by) };
-        let plan = self.plan(layout, file.names(), |_| None)?;
+        let plan = self.plan(layout, file.names(), |at| file.unit(at))?;
         let at = self.named(file.names(), by)?;
         let cells = columns::read(self, file.as_mut(), &plan, Some(at))?;
         let keys = match cells.last() {

@@ -41,10 +41,12 @@ impl Form {
         let mut lines = Vec::new();
         let mut remark = None;
         for (number, text) in head.split(|byte| *byte == b'\n').enumerate().skip(file.preamble.unwrap_or(0)) {
-            let text = text.trim_ascii();
+            // A tab at an end is a cell that is empty.
+            let text = text.strip_suffix(b"\r").unwrap_or(text);
+            let text: &[u8] = if text.trim_ascii().is_empty() { b"" } else { trimmed(text) };
             if text.first() == Some(&file.comment) {
                 if lines.is_empty() {
-                    remark = Some(Line { number, text: &text[1..] });
+                    remark = Some(Line { number, text: text[1..].trim_ascii_start() });
                 }
             } else if text.len() <= 5 && text.get(..4).is_some_and(|begin| begin.eq_ignore_ascii_case(b"sep=")) {
                 if file.separator.is_none() {
@@ -147,6 +149,14 @@ pub(super) fn split_unit(name: &str) -> (&str, Option<&str>) {
 /// Whether a cell holds a number, in any notation, a date, or says that there is none.
 pub(super) fn is_value(cell: &str) -> bool {
     is_missing(cell.as_bytes()) || cell.replacen(',', ".", 1).parse::<f64>().is_ok() || Stamp::read(cell).is_some()
+}
+
+/// A line without spaces at its ends.
+fn trimmed(mut line: &[u8]) -> &[u8] {
+    while let [b' ', rest @ ..] | [rest @ .., b' '] = line {
+        line = rest;
+    }
+    line
 }
 
 /// The cells of one line.

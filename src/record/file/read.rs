@@ -57,7 +57,7 @@ impl DataFile {
     pub fn read_record(&self, layout: &Layout) -> Result<Record, Error> {
         self.check(layout)?;
         if let Some(mut file) = columns::open(self)? {
-            let plan = self.plan(layout, file.names(), |_| None)?;
+            let plan = self.plan(layout, file.names(), |at| file.unit(at))?;
             let cells = columns::read(self, file.as_mut(), &plan, None)?;
             return self.of_columns(&plan, file.as_ref(), &cells, None);
         }
@@ -181,7 +181,8 @@ impl DataFile {
         let said = self.said(&signal.name);
         let column = self.place(names, &signal.name)?;
         let name = &names[column];
-        let written = split_unit(name).1.filter(|_| name != said.name());
+        // A signal may have brackets in its own name.
+        let written = split_unit(name).1.filter(|_| *name != signal.name);
         if let (None, Some(file)) = (said.factor, written.or_else(|| below(column))) {
             let (file, model) = (file.to_owned(), signal.unit.clone());
             if let Some(factor) = reading::factor(&file, &model) {

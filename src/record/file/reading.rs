@@ -118,12 +118,12 @@ impl fmt::Display for TimeSource {
 /// Units of time, their size (s) and how files write them, the first as it is shown.
 const TIMES: [(f64, &[&str]); 7] = [
     (1.0, &["s", "sec", "secs", "second", "seconds", "sek", "sekunden"]),
-    (1e-3, &["ms", "msec", "millisecond", "milliseconds"]),
-    (1e-6, &["us", "µs", "μs", "usec", "microseconds"]),
-    (1e-9, &["ns", "nanoseconds"]),
-    (60.0, &["min", "minute", "minutes", "minuten"]),
-    (3600.0, &["h", "hr", "hrs", "hour", "hours", "stunden"]),
-    (86_400.0, &["d", "day", "days", "tage"]),
+    (1e-3, &["ms", "msec", "msecs", "millisecond", "milliseconds"]),
+    (1e-6, &["us", "µs", "μs", "usec", "microsecond", "microseconds"]),
+    (1e-9, &["ns", "nsec", "nanosecond", "nanoseconds"]),
+    (60.0, &["min", "mins", "minute", "minutes", "minuten"]),
+    (3600.0, &["h", "hr", "hrs", "hour", "hours", "std", "stunde", "stunden"]),
+    (86_400.0, &["d", "day", "days", "tag", "tage"]),
 ];
 
 /// A unit of time by one of its names.

@@ -18,6 +18,9 @@ const NAMES: [&str; 9] =
 /// Names of columns of dates.
 const DATES: [&str; 2] = ["date", "datum"];
 
+/// What stands where a unit would, and is none.
+const NO_UNITS: [&str; 5] = ["", "utc", "gmt", "local", "unix"];
+
 /// Numbers beyond these are no seconds: milliseconds, microseconds and nanoseconds since 1970.
 const SINCE_1970: [(f64, f64); 3] = [(1e17, 1e-9), (1e14, 1e-6), (1e11, 1e-3)];
 
@@ -48,10 +51,29 @@ impl Ticks {
     }
 }
 
+/// The name of a column without its unit, spaces and large letters.
+fn plain(name: &str) -> String {
+    split_unit(name).0.to_lowercase().replace([' ', '_', '-'], "")
+}
+
+/// Whether a number is a date and a time of day, digit by digit: 20250320140500, without seconds or with milliseconds. As milliseconds or microseconds
+/// since 1970 these would be years to come, or of twelve digits the 1970s.
+fn is_compact(number: f64) -> bool {
+    let digits = format!("{number:.0}");
+    let part = |at: std::ops::Range<usize>, within: std::ops::RangeInclusive<u32>| {
+        digits.get(at).and_then(|text| text.parse().ok()).is_some_and(|part| within.contains(&part))
+    };
+    matches!(digits.len(), 12 | 14 | 17)
+        && part(0..4, 1980..=2099)
+        && part(4..6, 1..=12)
+        && part(6..8, 1..=31)
+        && part(8..10, 0..=23)
+        && part(10..12, 0..=59)
+}
+
 impl DataFile {
     /// The column of time: the one that was said, `t`, or the only one of such a name.
     pub(super) fn time_column(&self, names: &[String]) -> Result<usize, Error> {
-        let plain = |name: &str| split_unit(name).0.to_lowercase().replace([' ', '_', '-'], "");
         let called = |list: &[&str]| -> Vec<usize> {
             (0..names.len()).filter(|at| list.contains(&plain(&names[*at]).as_str())).collect()
         };
@@ -86,8 +108,20 @@ impl DataFile {
         if name.is_empty() && said.name.is_none() {
             return self.place(names, "t").map(|_| None);
         }
-        let written = split_unit(name).1.or_else(|| suffix(name));
-        let named = written.or(below).and_then(time_unit);
+        let written = split_unit(name).1.or_else(|| suffix(name)).or(below).map(str::trim);
+        let written = written.filter(|text| !NO_UNITS.contains(&text.to_lowercase().as_str()));
+        let named = written.and_then(time_unit);
+        let remedy = "say how many seconds one is by DataFile::factor(\"t\", ..)";
+        if let (Some(text), None, None) = (written, &named, said.factor) {
+            return Err(
+                self.cannot(format!("column `{name}` has times in `{text}`, no unit of time that is known: {remedy}"))
+            );
+        }
+        if said.factor.is_none() && (is_compact(first) || named.is_none() && DATES.contains(&plain(name).as_str())) {
+            return Err(self.cannot(format!(
+                "column `{name}` has dates that are written as numbers ({first}): write them as 2025-03-20 14:05:00, or, if they are a count, {remedy}"
+            )));
+        }
         let unit = said.factor.or_else(|| named.as_ref().map(TimeUnit::seconds));
         let long_ago = SINCE_1970.iter().find(|(least, _)| unit.is_none() && first.abs() >= *least);
         let (unit, origin) = long_ago.map_or((unit.unwrap_or(1.0), 0.0), |(_, unit)| (*unit, first));

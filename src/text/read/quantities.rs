@@ -31,12 +31,12 @@ impl Reader {
             None => None,
             Some(found) => match self.values.text(found)? {
                 "zero" => Some(Hold::Zero),
-                "linear" => Some(Hold::First),
+                "first" => Some(Hold::First),
                 other => {
                     let remark =
                         Remark::error(&self.values.source, found.span.clone(), format!("there is no hold `{other}`"));
                     let help =
-                        "\"zero\": constant from sample to sample; \"linear\": a straight line to the next sample";
+                        "\"zero\": constant from sample to sample; \"first\": a straight line to the next sample";
                     self.values.errors.push(remark.help(help.to_owned()));
                     None
                 }

@@ -15,6 +15,7 @@ pub(super) struct Hdf5<'a> {
     names: Vec<String>,
     /// Where the datasets are.
     paths: Vec<String>,
+    units: Vec<Option<String>>,
 }
 
 impl<'a> Hdf5<'a> {
@@ -28,7 +29,8 @@ impl<'a> Hdf5<'a> {
         let mut paths = vec![];
         datasets(&opened.root(), "", 0, &mut paths).map_err(failed)?;
         let names = paths.iter().map(|path: &String| path.replace('/', ".")).collect();
-        Ok(Hdf5 { file, opened, names, paths })
+        let units = paths.iter().map(|path| unit(&opened.dataset(path).ok()?)).collect();
+        Ok(Hdf5 { file, opened, names, paths, units })
     }
 
     fn dataset(&self, at: usize) -> Result<Vec<f64>, Error> {
@@ -61,6 +63,10 @@ impl Columns for Hdf5<'_> {
 
     fn names(&self) -> &[String] {
         &self.names
+    }
+
+    fn unit(&self, column: usize) -> Option<&str> {
+        self.units.get(column)?.as_deref()
     }
 
     fn read(&mut self, columns: &[usize], keys: Option<usize>) -> Result<Vec<Cells>, Error> {
@@ -99,6 +105,17 @@ fn class(dataset: &Dataset) -> Result<Option<String>, hdf5_pure::Error> {
         }
         _ => None,
     })
+}
+
+/// The unit of a dataset, as netCDF has it; of times without the date that they are counted from.
+fn unit(dataset: &Dataset) -> Option<String> {
+    let attributes = dataset.attrs().ok()?;
+    match attributes.get("units").or_else(|| attributes.get("unit"))? {
+        AttrValue::String(text) | AttrValue::AsciiString(text) => {
+            text.split(" since ").next().map(|unit| unit.trim().to_owned())
+        }
+        _ => None,
+    }
 }
 
 /// The attribute that says how the numbers of a dataset become values, as netCDF has it, or which number stands for none; NaN does so here, too.

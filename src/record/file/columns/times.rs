@@ -28,7 +28,7 @@ impl DataFile {
         match cells {
             Cells::Numbers(numbers) => {
                 let first = if samples == 0 { 0.0 } else { numbers[row(0)] };
-                let Some(ticks) = self.ticks(file.names(), None, at, first)? else { return even(1.0) };
+                let Some(ticks) = self.ticks(file.names(), file.unit(at), at, first)? else { return even(1.0) };
                 let stamps = (0..samples).map(|sample| ticks.time(numbers[row(sample)])).collect();
                 let source = TimeSource::Numbers { column, unit: ticks.unit, origin: ticks.origin };
                 Ok(((Time::from_stamps(stamps), ticks.shown), source))
