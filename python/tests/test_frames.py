@@ -190,6 +190,8 @@ def test_a_stream_is_read_once() -> None:
     assert rows.num_rows == 1
 
 
+# Straight lines through steps are wrong, which a warning says.
+@pytest.mark.filterwarnings("ignore::greybox.FitWarning")
 def test_what_is_said_of_all_holds_for_records_that_do_not_say_it() -> None:
     c = {**cooled(), "Body": cooled()["body"]}
     del c["body"]
@@ -199,8 +201,9 @@ def test_what_is_said_of_all_holds_for_records_that_do_not_say_it() -> None:
     assert found.parameters.k == again.parameters.k != k_of(cooled())
     # So do predictions of other frames.
     own = np.asarray(found.predict()["body"])
-    assert np.array_equal(np.asarray(found.predict(c)["body"]), own)
-    assert not np.array_equal(np.asarray(found.predict(c, hold="zero")["body"]), own)
+    # The initial state is estimated again, to the tolerance of a search.
+    assert np.allclose(np.asarray(found.predict(c)["body"]), own, rtol=1e-6)
+    assert not np.allclose(np.asarray(found.predict(c, hold="zero")["body"]), own, rtol=1e-3)
     assert isinstance(found.predict(pl.DataFrame(c)), pl.DataFrame)
     for of in (None, gb.Record(c)):
         with pytest.raises(gb.Error, match="hold is said of"):
