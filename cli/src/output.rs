@@ -26,9 +26,11 @@ pub fn write(path: Option<&Path>, content: &[u8]) -> Result<(), Failure> {
 pub fn check(path: Option<&Path>, endings: &[&str]) -> Result<(), Failure> {
     let Some(path) = path else { return Ok(()) };
     let ending = ending(path);
-    if !endings.is_empty() && !endings.contains(&ending.as_str()) {
-        let known = endings.join(", .");
-        return Err(format!("{}: files ending in .{ending} are not written; take .{known}", path.display()).into());
+    if let Some((last, before)) = endings.split_last().filter(|_| !endings.contains(&ending.as_str())) {
+        let before = if before.is_empty() { String::new() } else { format!(".{} or ", before.join(", .")) };
+        return Err(
+            format!("{}: files that end in .{ending} are not written; take {before}.{last}", path.display()).into()
+        );
     }
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
     match folder.is_none_or(Path::is_dir) && !path.is_dir() {

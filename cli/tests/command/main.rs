@@ -163,7 +163,7 @@ fn files_that_cannot_be_written_are_named_at_once() {
     let bench = Bench::new();
     for (option, path, says) in [
         ("--json", "nowhere/e.json", "no such folder"),
-        ("--report", "r.pdf", "take .html, .md, .json, .txt"),
+        ("--report", "r.pdf", "take .html, .md, .json or .txt"),
         ("--plot", "p.jpg", "take .svg"),
     ] {
         let (out, error) = bench.ends(1, &["fit", "pmsm.toml", "record.csv", option, path]);
