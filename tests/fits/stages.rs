@@ -152,7 +152,7 @@ fn the_path_is_told() {
     let filtered = fit().prefilter(Butterworth::low_pass(2, 20.0, 0.005).unwrap()).run().unwrap();
     assert!(said(&filtered).contains("there are none: the errors are filtered"), "{filtered}");
     let adaptive = fit().integrator(Rk45::default()).run().unwrap();
-    assert!(said(&adaptive).contains("so that there is no filter"), "{adaptive}");
+    assert!(said(&adaptive).contains("there is no filter that does"), "{adaptive}");
 }
 
 /// A time limit or a flag that ends the stages leaves a point, of one start and of several: not an error, and not a minimum.
