@@ -119,6 +119,8 @@ fn time_is_uniform_only_where_it_is() {
     // Seconds since 1970 resolve 2.4e-7 s: rounded, but even.
     let epoch: Vec<f64> = even.iter().map(|t| 1.7e9 + t).collect();
     assert!(matches!(Time::from_stamps(epoch), Time::Uniform { .. }));
+    // What is missing is on no grid.
+    assert!(matches!(Time::from_stamps(vec![0.0, f64::NAN, 0.3, 5.0, 100.0]), Time::Stamps(_)));
 }
 
 /// A pipe is read once; an uneven clock keeps its stamps there too.
