@@ -206,7 +206,7 @@ impl<'a, M: Made> Fit<'a, M> {
     ///
     /// Unless set, a fit searches from the declared start. If it is not usable and the model leaves one of the
     /// outputs unexplained ([`WarningCode::Unexplained`](crate::WarningCode::Unexplained)), it goes on by itself: in stages ([`staged`](Fit::staged)), and,
-    /// where these do not lead to errors near the noise, from 32 starts, after 150 evaluations of each from the best four only. It says so; with
+    /// where these lead to nothing usable, nor to errors near the noise, from 32 starts, after 150 evaluations of each from the best four only. It says so; with
     /// `starts(1)` it does not, and with more than 20,000 samples (2,000 where the model does not run in vector registers) in stages only.
     ///
     /// The first start is the declared one. The others are a Latin hypercube (McKay, Beckman and Conover, Technometrics 21
@@ -247,8 +247,8 @@ impl<'a, M: Made> Fit<'a, M> {
     /// many minima.
     ///
     /// A fit goes in stages without being asked where the declared start cannot be simulated by any of its methods. It does so, too, where its search
-    /// leaves an output unexplained: it searches from further starts after that only if the errors of the minimum that the stages lead to are above
-    /// 1.5 times the noise, and records are not long. After `starts(1)` it does neither. A fit that was asked for stages searches from no further
+    /// leaves an output unexplained: it searches from further starts after that only if the minimum that the stages lead to is not usable, with errors
+    /// above 1.5 times the noise, and records are not long. After `starts(1)` it does neither. A fit that was asked for stages searches from no further
     /// starts by itself.
     ///
     /// Where no simulation follows the measurements after the last stage, multiple shooting goes on from there

@@ -190,8 +190,8 @@ impl Problem<'_> {
         Some(Summary { seconds: found.seconds + begin.elapsed().as_secs_f64(), ..best })
     }
 
-    /// Further searches where an estimate leaves an output unexplained: in stages, and from further starts where the errors of the minimum that the
-    /// stages lead to are not near the noise, unless records are long. They run by the default method; the best minimum goes on by finer ones
+    /// Further searches where an estimate leaves an output unexplained: in stages, and from further starts where the minimum that the stages lead
+    /// to is not usable, nor its errors near the noise, unless records are long. They run by the default method; the best minimum goes on by finer ones
     /// where only the step is wrong with it. `None` where stages or a number of starts were asked for, where the measurements tell nothing by any
     /// parameters, and where the variance is predicted: that likelihood has no bound at noise levels of zero, which some start would find.
     pub(super) fn search_further(&self, found: &Summary, control: &Control) -> Option<Further> {
@@ -217,8 +217,9 @@ impl Problem<'_> {
         if self.samples() > most {
             return Some(staged.map_or(Further::TooLong(most), further));
         }
-        let explains = |best: &Summary| !leaves_unexplained(best) && self.is_near_noise(best);
-        if control.stops() || staged.as_ref().is_some_and(|(best, _)| explains(best)) {
+        let is_usable = |best: &Summary| best.severity() < Severity::NotUsable;
+        let suffices = |best: &Summary| is_usable(best) || !leaves_unexplained(best) && self.is_near_noise(best);
+        if control.stops() || staged.as_ref().is_some_and(|(best, _)| suffices(best)) {
             return staged.map(further);
         }
         let again = self.searched_from_starts(trials, begin, control).map(|best| (best, Way::Starts));
