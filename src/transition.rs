@@ -10,9 +10,8 @@ use crate::scalar::Scalar;
 const SHORT: f64 = 1.0 / 16.0;
 /// Terms of the series over a first step: the next one is below rounding, for covariances `(2 / 16)^11 / 11! = 3e-18`.
 const TERMS: usize = 10;
-/// With fewer doublings the series has a term for each product of entries along a chain of states, there and back and once more for slopes: a chain of
-/// integrators does not grow, however long the step, and its parts that the series lacks are left out of the interval. More doublings bring
-/// them, up to `2^-70` of themselves.
+/// With fewer doublings the series has a term for each product of entries along a chain of states, there and back and once more for slopes: the growth
+/// of a chain of integrators is zero, however long the step, so that no doubling follows, which would supply the products that the series lacks.
 const FEW: f64 = 6.0;
 /// Doublings in which a stable plant must come to rest: the slowest and the fastest time constant are up to a factor of some 1e10 apart.
 const DOUBLINGS: usize = 40;

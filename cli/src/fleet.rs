@@ -86,7 +86,7 @@ pub fn run(one: &Fleet, terminal: &Terminal) -> Result<Verdict, Failure> {
     Ok(if terminal.stopped() { worst.max(Verdict::WithCare) } else { worst })
 }
 
-/// Model and options, as a number by which others are told from these.
+/// A hash of the model and the options, so that a journal of other ones is not continued.
 fn made_by(one: &Fleet) -> String {
     let model = one.model.as_deref().unwrap_or_default();
     let text = std::fs::read(model).unwrap_or_else(|_| model.into());

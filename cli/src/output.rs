@@ -22,7 +22,7 @@ pub fn write(path: Option<&Path>, content: &[u8]) -> Result<(), Failure> {
     })?)
 }
 
-/// Checks, before hours of work, that a file can be written: its folder is there, and its ending is one of these, if there are any.
+/// Checks before a fit that a file can be written after it: its folder is there, and its ending is one of these, if any are given.
 pub fn check(path: Option<&Path>, endings: &[&str]) -> Result<(), Failure> {
     let Some(path) = path else { return Ok(()) };
     let ending = ending(path);

@@ -18,7 +18,7 @@ use toml::Value;
 /// The file's name, in the current folder.
 const FILE: &str = "greybox.toml";
 
-/// Options of a command that mean something else in others: the project's are those of `fit` and `fleet`.
+/// Options that mean something else in these commands: those of a project are for `fit` and `fleet`.
 const OTHERS: [(&str, &str); 5] =
     [("simulate", "noise"), ("simulate", "out"), ("convert", "out"), ("export", "out"), ("compare", "report")];
 

@@ -64,8 +64,8 @@ impl Problem<'_> {
         None
     }
 
-    /// A usable estimate of pieces by the method of another estimate, or by a finer one where only its step is wrong; with this problem by that method, and
-    /// that of the pieces.
+    /// A usable estimate of the pieces, by the integration method of `found`, or a finer one where only its step is too coarse; before it this problem
+    /// by that method, and the problem of the pieces.
     fn usable(
         &self,
         found: &Summary,

@@ -11,8 +11,8 @@ use std::sync::Arc;
 pub(super) const STEPS: u32 = 4;
 
 /// The state of linear equations with constant coefficients at the next sample follows by their transition, exactly, however long the interval
-/// ([`Crossing`](crate::transition::Crossing)). Only for these; what a filter integrates beside them, terms that the equations might lack, is
-/// integrated by steps.
+/// ([`Crossing`](crate::transition::Crossing)). For linear equations only; terms that a filter adds to them, to test
+/// whether equations lack them, are integrated by steps.
 #[derive(Debug)]
 pub(super) struct Exact;
 
