@@ -6,8 +6,8 @@
 //! reference, as on the bench, and position and command are compared.
 
 use clap::Parser;
-use greybox::models::{AxisParameters, ControlledAxisMotion, PositioningLoop};
-use greybox::{Experiment, Fit, Hold, Signals, fixed, free};
+use greybox::models::{AxisParameters, PositioningLoop};
+use greybox::{Experiment, Fit, Signals, free};
 use std::{path::PathBuf, process::ExitCode};
 
 /// Estimates mass and friction of the EMPS axis in a closed loop.
@@ -32,10 +32,7 @@ fn main() -> ExitCode {
 
 fn run(arguments: &Arguments) -> Result<(), greybox::Error> {
     let model = PositioningLoop::EMPS;
-    let record = Experiment::from_file(&model, &arguments.file)?
-        .named("EMPS")
-        .hold(Hold::First) // the reference is a smooth curve, sampled
-        .initial(ControlledAxisMotion { q: free(0.0), v: fixed(0.0), vm: fixed(0.0) }); // it starts at rest
+    let record = Experiment::from_file(&model, &arguments.file)?.named("EMPS");
     let estimate = Fit::new(&model, &record)
         .parameters(AxisParameters { m: free(80.0), fv: free(150.0), fc: free(15.0), offset: free(0.0) })
         .run()?;

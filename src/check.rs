@@ -32,7 +32,7 @@ pub enum Disagreement {
         "{function}: the slope of `{quantity}` with respect to `{variable}` is {exact} by duals and {numeric} by central differences; look for a value taken out of its `Scalar`, a wrong `chain`, or a kink or jump at this point"
     )]
     Slope {
-        /// `derivative`, `next` or `output`.
+        /// `derivative`, `jump`, `next` or `output`.
         function: &'static str,
         /// The state or output.
         quantity: &'static str,
@@ -93,7 +93,10 @@ pub fn derivatives<M: Model>(
         Kind::Continuous => {
             at.compare::<M::State>("derivative", &|x, u, p| model.derivative(t, x, u, p), &|x, u, p| {
                 model.derivative(t.into(), x, u, p)
-            })?
+            })?;
+            at.compare::<M::State>("jump", &|x, u, p| model.jump(t, x, u, p), &|x, u, p| {
+                model.jump(t.into(), x, u, p)
+            })?;
         }
         Kind::Discrete => {
             at.compare::<M::State>("next", &|x, u, p| model.next(t, x, u, p), &|x, u, p| {

@@ -13,7 +13,7 @@ mod terms;
 pub(crate) use dead_times::DeadTimes;
 pub(crate) use diffusion::Diffusion;
 pub(crate) use linear::Linear;
-pub(crate) use moments::MomentsOf;
+pub(crate) use moments::{AllMoments, MomentsOf};
 pub use roots::Roots;
 pub(crate) use slopes::{Jacobian, Slopes};
 pub(crate) use terms::{Term, WithTerms};
@@ -83,7 +83,7 @@ impl Equations {
         Equations::complete(layout, graph, &roots)
     }
 
-    /// The same with process noise, measurement noise, noise of the initial state and dead times.
+    /// The same with process noise, measurement noise, noise of the initial state, dead times and jumps.
     ///
     /// # Errors
     /// If they do not fit the layout, a noise of the initial state or a dead time depends on more than parameters, or an initial state on more than
@@ -153,11 +153,18 @@ impl Equations {
             let delay = M::Input::into_array(model.delay(&p));
             [diffusion.as_ref(), noise.as_ref(), initial.as_ref(), begin.as_ref(), delay.as_ref()].concat()
         })?;
-        Equations::traced(layout, &graph, [&state, &output, &levels])
+        let jump = match M::KIND {
+            Kind::Continuous => graph.trace(|| {
+                let (t, x, u, p) = leaves();
+                M::State::into_array(model.jump(t, &x, &u, &p)).as_ref().to_vec()
+            })?,
+            Kind::Discrete | Kind::Static => vec![],
+        };
+        Equations::traced(layout, &graph, [&state, &output, &levels, &jump])
     }
 
-    /// The equations of roots that were read: states, outputs, and levels of noise and dead times.
-    fn traced(layout: Layout, graph: &Graph, [state, output, levels]: [&[Id]; 3]) -> Result<Self, Untraceable> {
+    /// The equations of roots that were read: states, outputs, levels of noise and dead times, and states after a sample.
+    fn traced(layout: Layout, graph: &Graph, [state, output, levels, jump]: [&[Id]; 4]) -> Result<Self, Untraceable> {
         let mut levels = levels.iter().copied();
         // Noise that is not in the file is zero.
         let mut said = |count: usize, unsaid: fn(f64) -> bool| -> Vec<Id> {
@@ -174,6 +181,7 @@ impl Equations {
             initial_noise: said(layout.states.len(), zero),
             initial: said(layout.states.len(), f64::is_nan),
             delay: said(layout.inputs.len(), zero),
+            jump: if graph.are_states(jump) { vec![] } else { jump.to_vec() },
         };
         Equations::complete(layout, graph, &roots).map_err(|wrong| Untraceable { reason: wrong.to_string() })
     }
@@ -193,6 +201,14 @@ impl Equations {
         &self.roots
     }
 
+    /// For each state, what it is after a sample, where that changes it.
+    pub(crate) fn jumping(&self) -> Vec<Option<Id>> {
+        match self.roots.jump.is_empty() {
+            true => vec![None; self.layout.states.len()],
+            false => (0..).zip(&self.roots.jump).map(|(i, id)| (!self.graph.is_state(*id, i)).then_some(*id)).collect(),
+        }
+    }
+
     /// Which states the model says at the first sample ([`Model::initial`]).
     pub(crate) fn begins(&self) -> Vec<bool> {
         let said = |id: &Id| !self.graph.known(*id).is_some_and(f64::is_nan);
@@ -202,16 +218,16 @@ impl Equations {
         }
     }
 
-    /// Whether derivatives and outputs are affine in the states: then so is each step, and slopes do not depend on states.
+    /// Whether derivatives, outputs and jumps are affine in the states: then so is each step, and slopes do not depend on states.
     pub fn is_affine(&self) -> bool {
         let degrees = degrees(&self.graph, &|leaf| matches!(leaf, Leaf::State(_)));
         self.roots.moving().iter().all(|root| degrees[root.index()] <= Degree::One)
     }
 
-    /// Moments of derivatives (next states), and of outputs, of a Gaussian state.
-    pub(crate) fn moments(&self) -> (MomentsOf, MomentsOf) {
+    /// Moments of its functions of a Gaussian state.
+    pub(crate) fn moments(&self) -> AllMoments {
         let of = |roots: &[Id]| MomentsOf::of(&self.graph, roots, self.layout.states.len());
-        (of(&self.roots.state), of(&self.roots.output))
+        AllMoments { state: of(&self.roots.state), output: of(&self.roots.output), jump: of(&self.roots.jump) }
     }
 
     /// The values of roots; without time, states and inputs for what depends on parameters alone.
@@ -287,10 +303,19 @@ impl<S: Scalar> Functions<S> for Equations {
         to.fill(S::from(0.0));
         self.values(&self.roots.delay, None, p, to);
     }
+
+    fn jumps(&self) -> bool {
+        !self.roots.jump.is_empty()
+    }
+
+    fn jump(&self, t: S, x: &[S], u: &[S], p: &[S], to: &mut [S]) {
+        to.copy_from_slice(x);
+        self.values(&self.roots.jump, Some((t, x, u)), p, to);
+    }
 }
 
 impl Display for Equations {
-    /// One line per state, output and dead time, by the names of the layout, after what they share.
+    /// One line per state, jump, output and dead time, by the names of the layout, after what they share.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let left = |name: &str| match self.layout.kind {
             Kind::Continuous => format!("d({name})/dt"),
@@ -298,11 +323,13 @@ impl Display for Equations {
         };
         let state =
             self.layout.states.iter().zip(&self.roots.state).map(|(quantity, root)| (left(&quantity.name), *root));
+        let jumps = self.layout.states.iter().zip(self.jumping());
+        let jump = jumps.filter_map(|(state, root)| Some((format!("{} after a sample", state.name), root?)));
         let outputs = self.layout.outputs.iter().zip(&self.roots.output);
         let output = outputs.map(|(quantity, root)| (format!("output {}", quantity.name), *root));
         let late = self.layout.inputs.iter().zip(&self.roots.delay).zip(self.late()).filter(|(_, late)| *late);
         let delay = late.map(|((quantity, root), _)| (format!("dead time of {}", quantity.name), *root));
-        let roots: Vec<(String, Id)> = state.chain(output).chain(delay).collect();
+        let roots: Vec<(String, Id)> = state.chain(jump).chain(output).chain(delay).collect();
         self.graph.write(f, &|leaf| name(&self.layout, leaf), &roots)
     }
 }

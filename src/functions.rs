@@ -31,6 +31,12 @@ pub trait Functions<S>: Send + Sync {
     /// Dead time of each input, as [`Model::delay`].
     fn delay(&self, p: &[S], to: &mut [S]);
 
+    /// Whether any state may jump at samples.
+    fn jumps(&self) -> bool;
+
+    /// The state after a sample, as [`Model::jump`].
+    fn jump(&self, t: S, x: &[S], u: &[S], p: &[S], to: &mut [S]);
+
     /// The slopes of [`state`](Functions::state) with respect to the states, row by row: unless written, by secants, which are exact of
     /// functions that are affine.
     fn state_slopes(&self, t: S, x: &[S], u: &[S], p: &[S], to: &mut [S])
@@ -46,6 +52,14 @@ pub trait Functions<S>: Send + Sync {
         S: Scalar,
     {
         secants(x.len(), to, &|x, to| self.output(t, x, u, p, to));
+    }
+
+    /// Those of the state after a sample.
+    fn jump_slopes(&self, t: S, x: &[S], u: &[S], p: &[S], to: &mut [S])
+    where
+        S: Scalar,
+    {
+        secants(x.len(), to, &|x, to| self.jump(t, x, u, p, to));
     }
 
     /// Moments of [`state`](Functions::state) where the state is Gaussian, its covariance after its mean in `carry`: unless written, those of
@@ -70,6 +84,18 @@ pub trait Functions<S>: Send + Sync {
         let (mut mean, mut slopes) = (vec![S::from(0.0); outputs], vec![S::from(0.0); outputs * n]);
         self.output(t, &carry[..n], u, p, &mut mean);
         self.output_slopes(t, &carry[..n], u, p, &mut slopes);
+        Moments { mean, slopes, spread: vec![] }
+    }
+
+    /// Those of the state after a sample.
+    fn jump_moments(&self, t: S, carry: &[S], u: &[S], p: &[S], layout: &Layout) -> Moments<S>
+    where
+        S: Scalar,
+    {
+        let n = layout.states.len();
+        let (mut mean, mut slopes) = (vec![S::from(0.0); n], vec![S::from(0.0); n * n]);
+        self.jump(t, &carry[..n], u, p, &mut mean);
+        self.jump_slopes(t, &carry[..n], u, p, &mut slopes);
         Moments { mean, slopes, spread: vec![] }
     }
 }
@@ -180,6 +206,16 @@ impl<M: Model, S: Scalar> Functions<S> for Handle<'_, M> {
     fn delay(&self, p: &[S], to: &mut [S]) {
         let p = M::Parameters::from_fn(|i| p[i]);
         to.copy_from_slice(M::Input::into_array(Model::delay(&**self, &p)).as_ref());
+    }
+
+    /// What is compiled does not tell whether it changes the state.
+    fn jumps(&self) -> bool {
+        M::KIND == Kind::Continuous
+    }
+
+    fn jump(&self, t: S, x: &[S], u: &[S], p: &[S], to: &mut [S]) {
+        let (x, u, p) = (M::State::from_fn(|i| x[i]), M::Input::from_fn(|i| u[i]), M::Parameters::from_fn(|i| p[i]));
+        to.copy_from_slice(M::State::into_array(Model::jump(&**self, t, &x, &u, &p)).as_ref());
     }
 }
 

@@ -65,7 +65,13 @@ impl Layout {
         match (self.states.get(number), self.kind) {
             (Some(state), Kind::Continuous) => format!("the derivative of state `{}`", state.name),
             (Some(state), _) => format!("the next value of state `{}`", state.name),
-            (None, _) => format!("output `{}`", self.outputs[number - self.states.len()].name),
+            (None, _) => match self.outputs.get(number - self.states.len()) {
+                Some(output) => format!("output `{}`", output.name),
+                None => format!(
+                    "state `{}` after a sample",
+                    self.states[number - self.states.len() - self.outputs.len()].name
+                ),
+            },
         }
     }
 }

@@ -77,6 +77,23 @@ pub trait Model: Send + Sync {
         Self::State::splat(S::from(f64::NAN))
     }
 
+    /// The state just after the sample at time `t` (s), of a continuous model, from the state before it and the input at the sample: what changes at
+    /// once there, before the interval to the next. So a digital controller computes its command, which its states hold until the next
+    /// sample (their derivative is zero), and an input column of doses is added to a state. Unchanged unless written.
+    ///
+    /// Outputs at the sample are those of the state before it. Rows of a record at one instant are one sample: it changes the state once, after
+    /// them. Not called for other kinds.
+    #[inline]
+    fn jump<S: Scalar>(
+        &self,
+        _t: S,
+        x: &Of<Self::State, S>,
+        _u: &Of<Self::Input, S>,
+        _p: &Of<Self::Parameters, S>,
+    ) -> Of<Self::State, S> {
+        *x
+    }
+
     /// Process noise at time `t` (s): of a continuous model the standard deviation of each state's disturbance over one second of white
     /// noise (unit of the state per square root of a second), of a discrete model that of what is added at each step. Zero
     /// unless written. Predictors that filter use it ([`Kalman`](crate::Kalman)), at the state that they expect; a simulation does not.

@@ -139,15 +139,17 @@ impl<'a, M: Model, I: Integrator> Simulator<'a, M, I> {
                 Some(late) => &late.parts::<M::Input>(M::KIND, k)[..],
                 None => &[interval],
             };
+            let over = |interval| ModelSystem { model: self.model, interval, p: parameters };
+            let sample = Interval { u0: here, u1: here, ..interval };
+            x = over(&sample).jump(x);
             let begin = x;
             for interval in parts {
-                x = ModelSystem { model: self.model, interval, p: parameters }
-                    .step(&self.integrator, x, &mut step)
+                x = over(interval)
+                    .flow(&self.integrator, x, &mut step)
                     .map_err(|Stuck| failure("the progress of the integrator".to_owned(), 0.0, k, &time))?;
             }
             if let (Some(disturbance), Some(first)) = (&mut disturbance, parts.first()) {
-                let system = ModelSystem { model: self.model, interval: first, p: parameters };
-                x = disturbance.add(&system, &begin, time.at(k + 1) - time.at(k), &x);
+                x = disturbance.add(&over(first), &begin, time.at(k + 1) - time.at(k), &x);
             }
         }
         Ok(Simulation { time, hold: self.hold, inputs: inputs.to_vec(), states, outputs })

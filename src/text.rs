@@ -270,10 +270,12 @@ impl FromStr for Model {
 
 /// Quantities that no equation uses, but for states and inputs, which a record may have anyway.
 fn unused(document: &Document, source: &Arc<Source>) -> Vec<Remark> {
-    let rates = document
-        .states
-        .iter()
-        .flat_map(|state| [Some(&state.rate), state.diffusion.as_ref(), state.initial_noise.as_ref(), state.initial()]);
+    let rates = document.states.iter().flat_map(|one| {
+        [&one.rate, &one.jump, &one.diffusion, &one.initial_noise]
+            .map(Option::as_ref)
+            .into_iter()
+            .chain([one.initial()])
+    });
     let outputs = document.outputs.iter().flat_map(|output| [Some(&output.value), output.noise.as_ref()]);
     let delays = document.inputs.iter().map(|input| input.delay.as_ref());
     let all = rates.chain(outputs).chain(delays).flatten().chain(names::items(document));

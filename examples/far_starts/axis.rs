@@ -2,10 +2,8 @@
 //! (KU Leuven).
 
 use crate::{Ended, Random, Study};
-use greybox::models::{
-    AxisMotion, AxisParameters, Command, ControlledAxisMotion, Position, Positioning, PositioningLoop,
-};
-use greybox::{Error, Experiment, ExperimentOf, Fit, Hold, Model, Rk4, Scalar, Simulator, Summary, Time, fixed, free};
+use greybox::models::{AxisMotion, AxisParameters, Command, Position, Positioning, PositioningLoop};
+use greybox::{Error, Experiment, ExperimentOf, Fit, Model, Rk4, Scalar, Simulator, Summary, Time, fixed, free};
 use std::f64::consts::TAU;
 use std::path::Path;
 
@@ -78,13 +76,11 @@ pub fn open(study: &Study<'_>, record: &ExperimentOf<Positioning>, mut random: R
 }
 
 pub fn closed_record(path: &Path) -> Result<ExperimentOf<PositioningLoop>, Error> {
-    Ok(Experiment::from_file(&PositioningLoop::EMPS, path)?.hold(Hold::First))
+    Experiment::from_file(&PositioningLoop::EMPS, path)
 }
 
 pub fn closed(study: &Study<'_>, record: &ExperimentOf<PositioningLoop>, mut random: Random) -> Result<Ended, Error> {
-    let rest = ControlledAxisMotion { q: free(0.0), v: fixed(0.0), vm: fixed(0.0) };
-    let record = record.clone().initial(rest);
-    let found = study.of(Fit::new(&PositioningLoop::EMPS, &record).parameters(start(&mut random))).run();
+    let found = study.of(Fit::new(&PositioningLoop::EMPS, record).parameters(start(&mut random))).run();
     Ok(study.ended(found.as_ref().map(|found| found.summary()), distance))
 }
 

@@ -7,9 +7,9 @@
 use argmin::core::observers::ObserverMode;
 use clap::Parser;
 use greybox::diagnose::{Convergence, Resampling, bootstrap, profile};
-use greybox::models::{AxisParameters, ControlledAxisMotion, PositioningLoop};
+use greybox::models::{AxisParameters, PositioningLoop};
 use greybox::report::{Origin, Section};
-use greybox::{DataFile, ExperimentOf, Fit, Hold, Model, Of, Parameter, Report, fixed, free};
+use greybox::{DataFile, ExperimentOf, Fit, Model, Of, Parameter, Report, free};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::{error::Error, fs::File, io::BufRead, io::BufReader, path::PathBuf, process::ExitCode, sync::Arc};
 
@@ -57,8 +57,7 @@ fn run(arguments: &Arguments) -> Result<(), Box<dyn Error>> {
     let columns: Vec<&str> = header.split(',').map(str::trim).collect();
     let report = if ["qg", "vir"].iter().all(|name| columns.contains(name)) {
         let model = PositioningLoop::EMPS;
-        let rest = ControlledAxisMotion { q: free(0.0), v: fixed(0.0), vm: fixed(0.0) };
-        let record = DataFile::new(&arguments.file).read(&model)?.hold(Hold::First).initial(rest);
+        let record = DataFile::new(&arguments.file).read(&model)?;
         let axis = AxisParameters { m: free(80.0), fv: free(150.0), fc: free(15.0), offset: free(0.0) };
         reported(&model, &record, axis, arguments, &stop, None)?
     } else {

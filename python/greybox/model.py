@@ -29,6 +29,7 @@ class Model:
     ========================== =======================================================================
     ``derivative(t, x, u, p)`` the derivative of each state; of a model in continuous time
     ``next(t, x, u, p)``       the next value of each state; of a model in discrete time
+    ``jump(t, x, u, p)``       each state just after a sample, where samples change states of a model in continuous time
     ``output(t, x, u, p)``     each output; may be left out where all outputs are states
     ``diffusion(t, x, u, p)``  the intensity of the process noise of each state, for a Kalman predictor
     ``noise(t, x, u, p)``      the standard deviation of the noise of each output, for a Kalman predictor
@@ -73,6 +74,10 @@ class Model:
     def next(self, t: Symbol, x: Vector, u: Vector, p: Vector) -> Returned:
         """Give the next value of each state."""
         raise NotImplementedError(f"{type(self).__name__} has no method next(self, t, x, u, p)")
+
+    def jump(self, t: Symbol, x: Vector, u: Vector, p: Vector) -> Returned:
+        """Give each state just after a sample, from that before it."""
+        raise NotImplementedError(f"{type(self).__name__} has no method jump(self, t, x, u, p)")
 
     def output(self, t: Symbol, x: Vector, u: Vector, p: Vector) -> Returned:
         """Give each output: the states of these names, unless a model says otherwise."""
@@ -176,6 +181,7 @@ def model(
     derivative: Callable[..., Returned] | None = None,
     *,
     next: Callable[..., Returned] | None = None,
+    jump: Callable[..., Returned] | None = None,
     output: Callable[..., Returned] | None = None,
     diffusion: Callable[..., Returned] | None = None,
     noise: Callable[..., Returned] | None = None,
@@ -191,7 +197,7 @@ def model(
 
     Parameters
     ----------
-    derivative, next, output, diffusion, noise : callable, optional
+    derivative, next, jump, output, diffusion, noise : callable, optional
         As the methods of :class:`Model`, without ``self``.
     initial_noise, delay : callable, optional
         The same, of ``p`` alone.
@@ -212,7 +218,7 @@ def model(
     output body = body
     """
     levels = {"diffusion": diffusion, "noise": noise, "initial_noise": initial_noise, "initial": initial, "delay": delay}
-    functions = {"derivative": derivative, "next": next, "output": output, **levels}
+    functions = {"derivative": derivative, "next": next, "jump": jump, "output": output, **levels}
     given = {name: function for name, function in functions.items() if function is not None}
     return _Functions(given, {"states": states, "inputs": inputs, "outputs": outputs, "parameters": parameters})
 
@@ -251,6 +257,8 @@ def _read(of: Model) -> Equations:
     derivative, following = _written(of, "derivative"), _written(of, "next")
     if derivative and following:
         raise Error(f"{title} has derivative and next; write one: a model is in continuous or in discrete time")
+    if _written(of, "jump") and not derivative:
+        raise Error(f"{title} has jump and no derivative; a jump is what a sample changes in a model in continuous time")
     kind = "continuous" if derivative else "discrete" if following else "static"
     if kind == "static" and quantities["states"]:
         raise Error(f"{title} has states and neither derivative(t, x, u, p) nor next(t, x, u, p); write one")
@@ -301,6 +309,7 @@ def _roots(
         nodes("states", _written(of, "initial_noise"), "initial_noise", p),
         nodes("states", _written(of, "initial"), "initial", u, p),
         nodes("inputs", _written(of, "delay"), "delay", p),
+        nodes("states", _written(of, "jump"), "jump", t, x, u, p),
     ]
 
 

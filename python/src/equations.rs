@@ -30,19 +30,19 @@ fn names(of: &[Quantity]) -> Names {
 #[pymethods]
 impl Equations {
     /// Equations of quantities (states, inputs, outputs, parameters) and roots of a graph (derivatives or next states, outputs,
-    /// diffusions, noises, initial noises, initial states, dead times).
+    /// diffusions, noises, initial noises, initial states, dead times, states after a sample).
     #[new]
     fn new(
         kind: &str,
         quantities_by_role: [Names; 4],
         graph: &Graph,
-        roots: [Vec<PyRef<'_, Node>>; 7],
+        roots: [Vec<PyRef<'_, Node>>; 8],
     ) -> PyResult<Self> {
         let [states, inputs, outputs, parameters] = quantities_by_role.map(quantities);
         let layout = Layout { kind: named(kind)?, states, inputs, outputs, parameters };
         let ids = |nodes: Vec<PyRef<'_, Node>>| nodes.iter().map(|node| node.0).collect::<Vec<Id>>();
-        let [state, output, diffusion, noise, initial_noise, initial, delay] = roots.map(ids);
-        let roots = Roots { state, output, diffusion, noise, initial_noise, initial, delay };
+        let [state, output, diffusion, noise, initial_noise, initial, delay, jump] = roots.map(ids);
+        let roots = Roots { state, output, diffusion, noise, initial_noise, initial, delay, jump };
         let equations = greybox::equations::Equations::complete(layout, &graph.0, &roots);
         Ok(Equations(Arc::new(equations.map_err(raised)?)))
     }

@@ -45,6 +45,34 @@ def test_dead_times() -> None:
     assert pickle.loads(pickle.dumps(equations)) == equations
 
 
+def test_jumps() -> None:
+    def sampled(t: gb.Symbol, x: gb.Vector, u: gb.Vector, p: gb.Vector) -> Any:
+        return x.like(x=x.x + u.dose, z=x.z + p.k * (u.r - x.x))
+
+    model = gb.model(
+        lambda t, x, u, p: x.like(x=p.a * (x.z - x.x), z=0.0),
+        jump=sampled,
+        states={"x": "V", "z": "V"},
+        inputs={"r": "V", "dose": "V"},
+        outputs={"x": "V"},
+        parameters={"a": "1/s", "k": "1"},
+    )
+    equations = model.equations()
+    assert "x after a sample = x + dose" in str(equations)
+    assert pickle.loads(pickle.dumps(equations)) == equations
+    frame = {"t": np.arange(200) * 0.5, "r": np.where(np.arange(200) // 25 % 2, -0.5, 1.0), "dose": np.zeros(200)}
+    frame["dose"][30] = 0.8
+    made = gb.simulate(model, frame, parameters={"a": 0.6, "k": 0.4}, initial={"x": 0.0, "z": 0.0})
+    # From sample to sample x follows z, which jumps, by a factor that is known.
+    x, z, kept = 0.0, 0.0, np.exp(-0.3)
+    for r, dose, found in zip(frame["r"], frame["dose"], made["x"], strict=True):
+        assert abs(found - x) < 1e-4  # what one step of Runge-Kutta's method leaves
+        x, z = x + dose, z + 0.4 * (r - x)
+        x = z + (x - z) * kept
+    with pytest.raises(gb.Error, match="jump and no derivative"):
+        gb.model(next=lambda t, x, u, p: [x.a], jump=lambda t, x, u, p: [x.a], states=["a"], outputs=["a"]).equations()
+
+
 @pytest.mark.parametrize(
     "returned",
     [

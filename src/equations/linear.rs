@@ -51,7 +51,7 @@ struct Entry {
 }
 
 impl Equations {
-    /// These equations as linear ones; `None` where they are not, where their coefficients change, and where an input is late.
+    /// These equations as linear ones; `None` where they are not, where their coefficients change, where an input is late, and where states jump.
     pub(crate) fn linear(&self) -> Option<Linear> {
         let (layout, roots, graph) = (&self.layout, &self.roots, &self.graph);
         let degrees = degrees(graph, &|leaf| matches!(leaf, Leaf::State(_) | Leaf::Input(_)));
@@ -64,7 +64,8 @@ impl Equations {
             || on(&roots.diffusion, &|leaf| !matches!(leaf, Leaf::Parameter(_)));
         let is_late = self.late().contains(&true);
         let continuous = layout.kind == Kind::Continuous && !layout.states.is_empty();
-        (continuous && is_linear && !moves && !is_late).then(|| Linear::of(self))
+        let jumps = !roots.jump.is_empty();
+        (continuous && is_linear && !moves && !is_late && !jumps).then(|| Linear::of(self))
     }
 }
 

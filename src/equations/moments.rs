@@ -15,6 +15,17 @@ pub(crate) struct MomentsOf {
     pub functions: usize,
 }
 
+/// Those of a model's functions.
+#[derive(Clone, Debug)]
+pub(crate) struct AllMoments {
+    /// Of the derivatives, or the next states.
+    pub state: MomentsOf,
+    /// Of the outputs.
+    pub output: MomentsOf,
+    /// Of the states after a sample.
+    pub jump: MomentsOf,
+}
+
 impl MomentsOf {
     pub fn of(graph: &Graph, roots: &[Id], n: usize) -> Self {
         let slopes = Jacobian::of(graph, roots, n);

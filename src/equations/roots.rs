@@ -22,12 +22,14 @@ pub struct Roots {
     pub initial: Vec<Id>,
     /// The dead time of each input (s), as [`Model::delay`](crate::Model::delay).
     pub delay: Vec<Id>,
+    /// The state after a sample, as [`Model::jump`](crate::Model::jump); empty where samples change nothing.
+    pub jump: Vec<Id>,
 }
 
 impl Roots {
-    /// The derivatives (next states) and the outputs.
+    /// The derivatives (next states), the outputs and the states after a sample.
     pub(super) fn moving(&self) -> Vec<Id> {
-        [&*self.state, &self.output].concat()
+        [&*self.state, &self.output, &self.jump].concat()
     }
 
     /// Those that depend on parameters alone.
@@ -38,7 +40,7 @@ impl Roots {
     /// All, in the order of the fields.
     pub(crate) fn all(&self) -> Vec<Id> {
         let levels = [&*self.diffusion, &self.noise, &self.initial_noise, &self.initial, &self.delay].concat();
-        [self.moving(), levels].concat()
+        [&*self.state, &self.output, &levels, &self.jump].concat()
     }
 
     /// Roots of these counts, from a list of all of them in the order of the fields.
@@ -53,6 +55,7 @@ impl Roots {
             initial_noise: take(&self.initial_noise),
             initial: take(&self.initial),
             delay: take(&self.delay),
+            jump: take(&self.jump),
         }
     }
 
@@ -68,6 +71,7 @@ impl Roots {
             ("initial noises of states", states, &self.initial_noise, true),
             ("initial states", states, &self.initial, true),
             ("dead times of inputs", inputs, &self.delay, true),
+            ("states after a sample", if layout.kind == Kind::Continuous { states } else { 0 }, &self.jump, true),
         ];
         for (role, expected, found, may_be_empty) in counts {
             let found = found.len();

@@ -1,6 +1,6 @@
 //! [`Slopes`]: the slopes of equations with respect to the states, as graphs.
 
-use super::{Equations, evaluate};
+use super::{Equations, Roots, evaluate};
 use crate::graph::{Graph, Id, Leaf, Tape, Variables, Way, slopes};
 use crate::scalar::Scalar;
 
@@ -12,6 +12,8 @@ pub(crate) struct Slopes {
     pub state: Jacobian,
     /// Of the outputs.
     pub output: Jacobian,
+    /// Of the states after a sample; empty where samples change nothing.
+    pub jump: Jacobian,
 }
 
 /// The slopes of some functions, row by row.
@@ -25,7 +27,8 @@ impl Slopes {
     pub fn of(equations: &Equations) -> Self {
         let states = equations.layout().states.len();
         let of = |roots: &[Id]| Jacobian::of(equations.graph(), roots, states);
-        Slopes { state: of(&equations.roots().state), output: of(&equations.roots().output) }
+        let Roots { state, output, jump, .. } = equations.roots();
+        Slopes { state: of(state), output: of(output), jump: of(jump) }
     }
 }
 

@@ -23,12 +23,14 @@ pub(super) struct Parts {
     initial: Vec<Id>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     delay: Vec<Id>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    jump: Vec<Id>,
 }
 
 impl From<Equations> for Parts {
     fn from(Equations { layout, graph, roots }: Equations) -> Self {
-        let Roots { state, output, diffusion, noise, initial_noise, initial, delay } = roots;
-        Parts { layout, graph, state, output, diffusion, noise, initial_noise, initial, delay }
+        let Roots { state, output, diffusion, noise, initial_noise, initial, delay, jump } = roots;
+        Parts { layout, graph, state, output, diffusion, noise, initial_noise, initial, delay, jump }
     }
 }
 
@@ -36,7 +38,11 @@ impl TryFrom<Parts> for Equations {
     type Error = InvalidEquations;
 
     fn try_from(parts: Parts) -> Result<Self, InvalidEquations> {
-        let Parts { layout, graph, state, output, diffusion, noise, initial_noise, initial, delay } = parts;
-        Equations::complete(layout, &graph, &Roots { state, output, diffusion, noise, initial_noise, initial, delay })
+        let Parts { layout, graph, state, output, diffusion, noise, initial_noise, initial, delay, jump } = parts;
+        Equations::complete(
+            layout,
+            &graph,
+            &Roots { state, output, diffusion, noise, initial_noise, initial, delay, jump },
+        )
     }
 }

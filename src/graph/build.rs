@@ -36,6 +36,16 @@ impl Graph {
         }
     }
 
+    /// Whether nodes are the states, in order.
+    pub(crate) fn are_states(&self, ids: &[Id]) -> bool {
+        (0..).zip(ids).all(|(i, id)| self.is_state(*id, i))
+    }
+
+    /// Whether a node is the state of this number.
+    pub(crate) fn is_state(&self, id: Id, number: u32) -> bool {
+        matches!(self.node(id), Node::Leaf(Leaf::State(i)) if i == number)
+    }
+
     fn negated(&self, id: Id) -> Option<Id> {
         match self.node(id) {
             Node::Neg(a) => Some(a),

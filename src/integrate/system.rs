@@ -80,7 +80,7 @@ pub struct ModelSystem<'a, M: Model, S: Scalar> {
 }
 
 impl<M: Model, S: Scalar> ModelSystem<'_, M, S> {
-    /// The state at the end of the interval, from that at its begin.
+    /// The state at the end of the interval, from that before the sample at its begin.
     ///
     /// # Errors
     /// Where the method is [`Stuck`].
@@ -91,7 +91,31 @@ impl<M: Model, S: Scalar> ModelSystem<'_, M, S> {
         x: Of<M::State, S>,
         step: &mut f64,
     ) -> Result<Of<M::State, S>, Stuck> {
+        self.flow(integrator, self.jump(x), step)
+    }
+
+    /// The same from the state after the sample.
+    ///
+    /// # Errors
+    /// Where the method is [`Stuck`].
+    #[inline(always)]
+    pub fn flow<I: Integrator>(
+        &self,
+        integrator: &I,
+        x: Of<M::State, S>,
+        step: &mut f64,
+    ) -> Result<Of<M::State, S>, Stuck> {
         integrator.advance(self, M::State::into_array(x), step).map(M::State::from_array)
+    }
+
+    /// The state after the sample at the begin of the interval; unchanged where the next is at the same instant.
+    #[inline(always)]
+    pub fn jump(&self, x: Of<M::State, S>) -> Of<M::State, S> {
+        let Interval { t0, t1, .. } = *self.interval;
+        if M::KIND != Kind::Continuous || t1 <= t0 {
+            return x;
+        }
+        self.model.jump(S::from(t0), &x, &self.interval.input::<S>(0.0), self.p)
     }
 }
 

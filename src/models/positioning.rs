@@ -9,14 +9,18 @@ crate::signals! {
         /// Speed.
         v: "m/s",
     }
-    /// Motion of a linear axis, and the speed that its controller measures.
+    /// Motion of a linear axis, and what its controller keeps.
     pub struct ControlledAxisMotion {
         /// Position.
         q: "m",
         /// Speed.
         v: "m/s",
-        /// Speed, differenced and filtered.
-        vm: "m/s",
+        /// How far it has moved since the last sample.
+        moved: "m",
+        /// How far it moved in the interval before.
+        before: "m",
+        /// Command, held until the next sample.
+        held: "V",
     }
     /// Input of the axis.
     pub struct Command {
@@ -104,20 +108,15 @@ impl Model for Positioning {
     }
 }
 
-/// A [`Positioning`] axis under a position controller around a speed controller:
+/// A [`Positioning`] axis under a digital controller of position around one of speed, which computes at each sample and holds its command
+/// until the next:
 ///
 /// ```text
-/// vir = kp kv (qg - q) - kv vm,    |vir| <= limit
-/// lag dvm/dt = v - vm
+/// vir = kp kv (qg - q) - kv vm,    |vir| <= limit        vm = (q[k] - q[k-2]) / 2 ts
 /// ```
 ///
-/// The lag models how a digital controller computes the speed. In the record of the benchmark it can be read off: the
-/// speed in `kp kv (qg - q) - vir` is, to 0.2 %, the mean of the last two differences of the position, which
-/// is one sample old (1 ms).
-///
-/// The hold of the record must be [`Hold::First`](crate::Hold::First): the reference is a smooth curve of which the record
-/// has samples. Held from sample to sample instead it acts half a sample late, which biases the friction down to the wrong
-/// sign (`fv` -477 N s/m on the benchmark's record, with a better fit); an `fv` or `fc` below zero is a sign of it.
+/// So it is in the record of the benchmark: the speed in `kp kv (qg - q) - vir` is, to 0.2 %, the mean of the last two differences of
+/// the position. The controller is a sampled part of the model ([`Model::jump`]): the samples of a record must be its own, `ts` apart.
 ///
 /// The controller keeps the simulated axis near the reference whatever the parameters, so that a fit finds its way from
 /// far off; and the command that the model needs to do so, compared with the recorded one, determines the parameters.
@@ -131,18 +130,19 @@ pub struct PositioningLoop {
     pub kv: f64,
     /// Largest command (V).
     pub limit: f64,
-    /// Lag of the speed that the controller measures (s), by difference, filter and hold; positive.
-    pub lag: f64,
+    /// Its sampling time (s), which is that of the record; positive.
+    pub ts: f64,
 }
 
 impl PositioningLoop {
     /// The axis of the benchmark under its recorded controller.
     pub const EMPS: PositioningLoop =
-        PositioningLoop { axis: Positioning::EMPS, kp: 160.18, kv: 243.45, limit: 10.0, lag: 1e-3 };
+        PositioningLoop { axis: Positioning::EMPS, kp: 160.18, kv: 243.45, limit: 10.0, ts: 1e-3 };
 
     #[inline]
     fn command<S: Scalar>(&self, x: &ControlledAxisMotion<S>, u: &Reference<S>) -> S {
-        (((u.qg - x.q) * self.kp - x.vm) * self.kv).clamp(-self.limit, self.limit)
+        let vm = (x.moved + x.before) / (2.0 * self.ts);
+        (((u.qg - x.q) * self.kp - vm) * self.kv).clamp(-self.limit, self.limit)
     }
 }
 
@@ -157,11 +157,29 @@ impl Model for PositioningLoop {
         &self,
         _t: S,
         x: &ControlledAxisMotion<S>,
-        u: &Reference<S>,
+        _u: &Reference<S>,
         p: &AxisParameters<S>,
     ) -> ControlledAxisMotion<S> {
-        let v = self.axis.acceleration(x.v, self.command(x, u), p);
-        ControlledAxisMotion { q: x.v, v, vm: (x.v - x.vm) / self.lag }
+        let (v, still) = (self.axis.acceleration(x.v, x.held, p), S::from(0.0));
+        ControlledAxisMotion { q: x.v, v, moved: x.v, before: still, held: still }
+    }
+
+    #[inline]
+    fn jump<S: Scalar>(
+        &self,
+        _t: S,
+        x: &ControlledAxisMotion<S>,
+        u: &Reference<S>,
+        _p: &AxisParameters<S>,
+    ) -> ControlledAxisMotion<S> {
+        ControlledAxisMotion { moved: S::from(0.0), before: x.moved, held: self.command(x, u), ..*x }
+    }
+
+    /// Before the record the axis did not move.
+    #[inline]
+    fn initial<S: Scalar>(&self, _u: &Reference<S>, _p: &AxisParameters<S>) -> ControlledAxisMotion<S> {
+        let (still, unsaid) = (S::from(0.0), S::from(f64::NAN));
+        ControlledAxisMotion { q: unsaid, v: still, moved: still, before: still, held: still }
     }
 
     #[inline]

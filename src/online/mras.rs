@@ -246,15 +246,14 @@ impl<M: Model, L: AdaptationLaw<M>> Mras<M, L> {
             let pull = M::State::into_array(self.pull);
             M::State::from_fn(|i| x.as_ref()[i] + e.as_ref()[i] * pull.as_ref()[i])
         };
+        let interval = Interval { t0: t, t1: t + ts, u0: *u, u1: *u, hold: Hold::Zero };
+        let system = ModelSystem { model: &self.model, interval: &interval, p };
         if self.start.stepping == Stepping::Euler {
+            let x = system.jump(x);
             let slope = self.model.derivative(S::from(t), &x, &M::Input::map(*u, S::from), p);
             return Ok(pulled(crate::integrate::axpy::<M::State, S>(x, ts, slope)));
         }
-        let interval = Interval { t0: t, t1: t + ts, u0: *u, u1: *u, hold: Hold::Zero };
-        let advance = |x| {
-            let system = ModelSystem { model: &self.model, interval: &interval, p };
-            system.step(&Automatic::default(), x, &mut 0.0).map_err(|_| Divergence::Stuck)
-        };
+        let advance = |x| system.step(&Automatic::default(), x, &mut 0.0).map_err(|_| Divergence::Stuck);
         match self.start.order {
             Order::UpdateThenPredict => advance(pulled(x)),
             Order::Thesis => advance(x).map(pulled),

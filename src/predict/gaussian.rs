@@ -14,6 +14,9 @@ pub trait Order: 'static {
     /// Of the derivative at a fraction of the interval, or of the next state.
     fn state<S: Scalar>(plant: &dyn Plant<S>, position: f64, carry: &[S]) -> Moments<S>;
 
+    /// Of the state after the sample.
+    fn jump<S: Scalar>(plant: &dyn Plant<S>, carry: &[S]) -> Moments<S>;
+
     /// Of the outputs.
     fn outputs<S: Scalar>(plant: &dyn Plant<S>, carry: &[S]) -> Moments<S>;
 }
@@ -68,6 +71,22 @@ fn correct<O: Order, S: Scalar>(plant: &dyn Plant<S>, carry: &mut [S], output: u
     }
 }
 
+/// Replaces a state and its covariance by the moments of a function of them; `with_noise(i, j, p)` adds noise to an entry of the covariance.
+fn replace<S: Scalar>(carry: &mut [S], moments: Moments<S>, with_noise: impl Fn(usize, usize, S) -> S) {
+    let Moments { mean, slopes: a, spread } = moments;
+    let n = mean.len();
+    let before = carry[n..].to_vec();
+    carry[..n].copy_from_slice(&mean);
+    for i in 0..n {
+        for j in i..n {
+            let pairs = (0..n).flat_map(|k| (0..n).map(move |l| (k, l)));
+            let moved: S = pairs.map(|(k, l)| a[i * n + k] * before[entry(n, k, l)] * a[j * n + l]).sum();
+            let moved = spread.get(entry(n, i, j)).map_or(moved, |spread| moved + *spread);
+            carry[n + entry(n, i, j)] = with_noise(i, j, moved);
+        }
+    }
+}
+
 fn advance<O: Order, S: Scalar>(plant: &dyn Plant<S>, carry: &mut [S]) -> Result<(), Stuck> {
     let n = plant.layout().states.len();
     let noise_at = |position: f64, x: &[S]| {
@@ -76,21 +95,15 @@ fn advance<O: Order, S: Scalar>(plant: &dyn Plant<S>, carry: &mut [S]) -> Result
         move |i: usize, j: usize, moved: S| if i == j { moved + noise[i] * noise[i] } else { moved }
     };
     if plant.layout().kind == Kind::Discrete {
-        let Moments { mean, slopes: a, spread } = O::state(plant, 0.0, carry);
-        let (before, with_noise) = (carry[n..].to_vec(), noise_at(0.0, carry));
-        carry[..n].copy_from_slice(&mean);
-        for i in 0..n {
-            for j in i..n {
-                let pairs = (0..n).flat_map(|k| (0..n).map(move |l| (k, l)));
-                let moved: S = pairs.map(|(k, l)| a[i * n + k] * before[entry(n, k, l)] * a[j * n + l]).sum();
-                let moved = spread.get(entry(n, i, j)).map_or(moved, |spread| moved + *spread);
-                carry[n + entry(n, i, j)] = with_noise(i, j, moved);
-            }
-        }
+        let with_noise = noise_at(0.0, carry);
+        replace(carry, O::state(plant, 0.0, carry), with_noise);
         return Ok(());
     }
     if n == 0 {
         return Ok(());
+    }
+    if plant.jumps() {
+        replace(carry, O::jump(plant, carry), |_, _, moved| moved);
     }
     if plant.spread(&mut carry[n..]) {
         return plant.next(&mut carry[..n]);

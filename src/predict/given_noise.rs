@@ -187,7 +187,15 @@ impl Predictor for GivenNoise {
                 let before = carry.to_vec();
                 rate(0.0, &before, carry);
             }
-            _ => plant.integrate(carry, &rate)?,
+            _ => {
+                if plant.jumps() {
+                    let (mut slopes, before) = (vec![S::from(0.0); n * n], carry.to_vec());
+                    plant.jump_slopes(&before[..n], &mut slopes);
+                    plant.jump(carry);
+                    product(&slopes, &before[n..], n, &mut carry[n..]);
+                }
+                plant.integrate(carry, &rate)?;
+            }
         }
         self.widen(plant, &mut carry[n..]);
         Ok(())

@@ -60,6 +60,14 @@ impl Order for Kalman {
         Moments { mean, slopes, spread: vec![] }
     }
 
+    fn jump<S: Scalar>(plant: &dyn Plant<S>, carry: &[S]) -> Moments<S> {
+        let n = plant.layout().states.len();
+        let (mut mean, mut slopes) = (carry[..n].to_vec(), vec![S::from(0.0); n * n]);
+        plant.jump_slopes(&carry[..n], &mut slopes);
+        plant.jump(&mut mean);
+        Moments { mean, slopes, spread: vec![] }
+    }
+
     fn outputs<S: Scalar>(plant: &dyn Plant<S>, carry: &[S]) -> Moments<S> {
         let (n, outputs) = (plant.layout().states.len(), plant.layout().outputs.len());
         let (mut mean, mut slopes) = (vec![S::from(0.0); outputs], vec![S::from(0.0); outputs * n]);

@@ -47,6 +47,19 @@ pub trait Plant<S> {
     /// Those of the outputs at the sample.
     fn output_moments(&self, carry: &[S]) -> Moments<S>;
 
+    /// Whether any state may jump at samples.
+    fn jumps(&self) -> bool;
+
+    /// Replaces the state before the sample by that after it ([`Model::jump`](crate::Model::jump)); entries of a longer vector after the state are not
+    /// changed. [`next`](Plant::next) does so itself, [`integrate`](Plant::integrate) does not.
+    fn jump(&self, x: &mut [S]);
+
+    /// The slopes of the state after the sample with respect to that before it, row by row.
+    fn jump_slopes(&self, x: &[S], to: &mut [S]);
+
+    /// Moments of the state after the sample, as [`state_moments`](Plant::state_moments).
+    fn jump_moments(&self, carry: &[S]) -> Moments<S>;
+
     /// How long the interval is (s).
     fn length(&self) -> S;
 
@@ -113,6 +126,11 @@ impl<S: Scalar> Between<S> {
     /// How long it is (s).
     pub fn length(&self) -> f64 {
         self.interval.1
+    }
+
+    /// Whether the next sample is at another instant.
+    fn passes(&self) -> bool {
+        self.length() > 0.0
     }
 
     fn crossed(&self) -> Option<&Part<S>> {
@@ -265,6 +283,7 @@ impl<S: Stepped> Plant<S> for SlicePlant<'_, S> {
             crossing.state(state, self.between.u1.is_some(), |position, x, to| self.derivative(position, x, to));
             return Ok(());
         }
+        self.jump(state);
         let p: Vec<Duals> = self.p.iter().map(|p| Dual::constant(p.value())).collect();
         let slopes = |position: f64, x: &[f64]| {
             let t = Dual::constant(self.between.time(position).value());
@@ -296,6 +315,33 @@ impl<S: Stepped> Plant<S> for SlicePlant<'_, S> {
     fn output_moments(&self, carry: &[S]) -> Moments<S> {
         let (t, u) = (self.between.time(0.0), self.between.input(0.0));
         self.functions.output_moments(t, carry, &u, self.p, self.layout)
+    }
+
+    fn jumps(&self) -> bool {
+        self.functions.jumps()
+    }
+
+    fn jump(&self, x: &mut [S]) {
+        if self.jumps() && self.between.passes() {
+            let (state, _) = x.split_at_mut(self.layout.states.len());
+            let before = state.to_vec();
+            self.functions.jump(self.between.time(0.0), &before, &self.between.input(0.0), self.p, state);
+        }
+    }
+
+    fn jump_slopes(&self, x: &[S], to: &mut [S]) {
+        if !self.between.passes() {
+            return to.copy_from_slice(&identity(x.len()));
+        }
+        self.functions.jump_slopes(self.between.time(0.0), x, &self.between.input(0.0), self.p, to);
+    }
+
+    fn jump_moments(&self, carry: &[S]) -> Moments<S> {
+        let n = self.layout.states.len();
+        if !self.between.passes() {
+            return Moments { mean: carry[..n].to_vec(), slopes: identity(n), spread: vec![] };
+        }
+        self.functions.jump_moments(self.between.time(0.0), carry, &self.between.input(0.0), self.p, self.layout)
     }
 
     fn length(&self) -> S {
@@ -341,6 +387,11 @@ impl<S: Stepped> Plant<S> for SlicePlant<'_, S> {
     fn initial_noise(&self, to: &mut [S]) {
         self.functions.initial_noise(self.p, to);
     }
+}
+
+/// The slopes of what does not change, row by row.
+pub(super) fn identity<S: Scalar>(n: usize) -> Vec<S> {
+    (0..n * n).map(|at| S::from(f64::from(u8::from(at % (n + 1) == 0)))).collect()
 }
 
 /// Value of `f` and its Jacobian by rows, eight columns at a time.

@@ -33,6 +33,10 @@ impl Order for SecondOrder {
         plant.state_moments(position, carry)
     }
 
+    fn jump<S: Scalar>(plant: &dyn Plant<S>, carry: &[S]) -> Moments<S> {
+        plant.jump_moments(carry)
+    }
+
     fn outputs<S: Scalar>(plant: &dyn Plant<S>, carry: &[S]) -> Moments<S> {
         plant.output_moments(carry)
     }

@@ -1,7 +1,8 @@
 //! A predictor and the equations that it predicts, traced as one graph.
 
+use super::plant::identity;
 use super::{Moments, Plant, Prediction, StartsFrom};
-use crate::equations::{Equations, Jacobian, MomentsOf, Slopes};
+use crate::equations::{AllMoments, Equations, Jacobian, MomentsOf, Slopes};
 use crate::functions::Functions;
 use crate::graph::{Graph, Id, Leaf, Node, Symbol, Untraceable};
 use crate::integrate::{Method, Stuck};
@@ -103,7 +104,7 @@ struct SymbolicPlant<'a> {
     /// Of a predictor that asks for them.
     slopes: Option<&'a Slopes>,
     /// Made when a predictor asks for them.
-    moments: &'a OnceCell<(MomentsOf, MomentsOf)>,
+    moments: &'a OnceCell<AllMoments>,
     p: Vec<Symbol>,
 }
 
@@ -122,8 +123,7 @@ impl SymbolicPlant<'_> {
         to.iter_mut().zip(found).for_each(|(to, found)| *to = found);
     }
 
-    /// Of the state and of the outputs.
-    fn equations_moments(&self) -> &(MomentsOf, MomentsOf) {
+    fn equations_moments(&self) -> &AllMoments {
         self.moments.get_or_init(|| self.interval.equations().moments())
     }
 
@@ -164,11 +164,35 @@ impl Plant<Symbol> for SymbolicPlant<'_> {
     }
 
     fn state_moments(&self, position: f64, carry: &[Symbol]) -> Moments<Symbol> {
-        self.moments(&self.equations_moments().0, position, carry)
+        self.moments(&self.equations_moments().state, position, carry)
     }
 
     fn output_moments(&self, carry: &[Symbol]) -> Moments<Symbol> {
-        self.moments(&self.equations_moments().1, 0.0, carry)
+        self.moments(&self.equations_moments().output, 0.0, carry)
+    }
+
+    fn jumps(&self) -> bool {
+        !self.interval.equations().roots().jump.is_empty()
+    }
+
+    fn jump(&self, x: &mut [Symbol]) {
+        let (state, _) = x.split_at_mut(self.layout().states.len());
+        self.interval.jump(state);
+    }
+
+    fn jump_slopes(&self, x: &[Symbol], to: &mut [Symbol]) {
+        self.jacobian(|slopes| &slopes.jump, 0.0, x, to);
+        let unchanged = identity(x.len());
+        to.iter_mut().zip(unchanged).for_each(|(to, or)| *to = self.interval.if_time_passes(*to, or));
+    }
+
+    fn jump_moments(&self, carry: &[Symbol]) -> Moments<Symbol> {
+        let Moments { mean, slopes, spread } = self.moments(&self.equations_moments().jump, 0.0, carry);
+        let either = |found: Vec<Symbol>, or: &[Symbol]| {
+            found.into_iter().zip(or).map(|(found, or)| self.interval.if_time_passes(found, *or)).collect()
+        };
+        let (slopes, none) = (either(slopes, &identity(mean.len())), vec![Symbol::default(); spread.len()]);
+        Moments { slopes, spread: either(spread, &none), mean: either(mean, carry) }
     }
 
     fn length(&self) -> Symbol {

@@ -7,6 +7,7 @@ use crate::integrate::{Method, Rate, SymbolicField};
 use crate::interval::Hold;
 use crate::layout::Kind;
 use crate::record::Holds;
+use crate::scalar::{Comparison, Scalar};
 use crate::transition::Crossing;
 use core::cell::{Cell, OnceCell};
 
@@ -103,11 +104,23 @@ impl<'a> SymbolicInterval<'a> {
         self.crossing.get_or_init(made).as_ref()
     }
 
+    /// The state after the sample.
+    pub fn jump(&self, x: &mut [Symbol]) {
+        let after = self.at(self.equations.graph(), &self.equations.roots().jump, 0.0, x);
+        x.iter_mut().zip(after).for_each(|(x, after)| *x = self.if_time_passes(after, *x));
+    }
+
+    /// One of two numbers, by whether the next sample is at another instant.
+    pub fn if_time_passes(&self, then: Symbol, or: Symbol) -> Symbol {
+        Symbol::select(Comparison::Less, Symbol::default(), Symbol::leaf(Leaf::Step), then, or)
+    }
+
     /// The state at the next sample.
     pub fn next(&self, x: &mut [Symbol]) {
         if let Some(crossing) = self.crossing() {
             return crossing.state(x, !self.holds.all_zero(), |position, x, to| self.rate(position, x, to));
         }
+        self.jump(x);
         let kind = self.equations.layout().kind;
         self.cross(kind, x, &|position, x, to| self.rate(position, x, to));
     }

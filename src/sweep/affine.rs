@@ -11,7 +11,7 @@ const SCALES: [f64; 3] = [1e-3, 1.0, 1e3];
 /// `f(a + b) + f(0)` and `f(a) + f(b)` of an affine function differ by some roundings of their terms.
 const ROUNDING: f64 = 1e-9;
 
-/// The first of derivatives (next states) and outputs that is not affine, by its number among them; `None` if all are, or are undefined at
+/// The first of derivatives (next states), outputs and states after a sample that is not affine, by its number among them; `None` if all are, or are undefined at
 /// the origin.
 pub(super) fn not_affine(layout: &Layout, functions: &dyn Functions<f64>, record: &Record, p: &[f64]) -> Option<usize> {
     let n = layout.states.len();
@@ -31,7 +31,9 @@ pub(super) fn not_affine(layout: &Layout, functions: &dyn Functions<f64>, record
                     functions.state(t, x, &u, p, &mut state);
                 }
                 functions.output(t, x, &u, p, &mut output);
-                [state, output].concat()
+                let mut after = x.to_vec();
+                functions.jump(t, x, &u, p, &mut after);
+                [state, output, after].concat()
             };
             // All states, of both signs and different sizes; with the one at hand moved in addition, products of two states show.
             let b: Vec<f64> = (0..n).map(|j| size * [1.0, -0.7, 0.4][j % 3]).collect();
@@ -73,6 +75,10 @@ mod tests {
         fn initial_noise(&self, _p: &[f64], _to: &mut [f64]) {}
         fn initial(&self, _u: &[f64], _p: &[f64], _to: &mut [f64]) {}
         fn delay(&self, _p: &[f64], _to: &mut [f64]) {}
+        fn jumps(&self) -> bool {
+            false
+        }
+        fn jump(&self, _t: f64, _x: &[f64], _u: &[f64], _p: &[f64], _to: &mut [f64]) {}
     }
 
     /// The first equation that is not affine where measurements are 2 V.

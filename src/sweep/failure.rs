@@ -93,6 +93,7 @@ impl FailureSearch<'_> {
                 if let Some((i, value)) = runaway(&x) {
                     return broken(k, format!("state `{}`", name(i)), value, OVERFLOW);
                 }
+                plant.jump(&mut x);
                 plant.derivative(0.0, &x, &mut next);
                 return match unsound(&next) {
                     Some((i, value, hint)) => broken(k, format!("the derivative of state `{}`", name(i)), value, hint),
@@ -175,6 +176,14 @@ impl Functions<f64> for Watched<'_> {
 
     fn delay(&self, p: &[f64], to: &mut [f64]) {
         self.values.delay(p, to);
+    }
+
+    fn jumps(&self) -> bool {
+        self.values.jumps()
+    }
+
+    fn jump(&self, t: f64, x: &[f64], u: &[f64], p: &[f64], to: &mut [f64]) {
+        self.values.jump(t, x, u, p, to);
     }
 
     // Not by secants, whose states are large.

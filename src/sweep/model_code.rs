@@ -3,7 +3,7 @@
 use super::filtered::Filter;
 use super::{Loops, Piece, Reached, RunError, Seed, Visit};
 use crate::dual::Dual;
-use crate::equations::{Equations, MomentsOf, Slopes};
+use crate::equations::{AllMoments, Equations, Slopes};
 use crate::functions::{Functions, Handle};
 use crate::integrate::Duals;
 use crate::layout::{Kind, Layout};
@@ -120,7 +120,7 @@ pub(crate) struct Evaluated {
     late: Vec<bool>,
     /// Made when a predictor asks for them.
     slopes: OnceLock<Slopes>,
-    moments: OnceLock<(MomentsOf, MomentsOf)>,
+    moments: OnceLock<AllMoments>,
 }
 
 impl Evaluated {
@@ -133,8 +133,7 @@ impl Evaluated {
         self.slopes.get_or_init(|| Slopes::of(&self.equations))
     }
 
-    /// Of the state and of the outputs.
-    fn moments(&self) -> &(MomentsOf, MomentsOf) {
+    fn moments(&self) -> &AllMoments {
         self.moments.get_or_init(|| self.equations.moments())
     }
 }
@@ -177,11 +176,27 @@ impl<S: Scalar> Functions<S> for Evaluated {
     }
 
     fn state_moments(&self, t: S, carry: &[S], u: &[S], p: &[S], _layout: &Layout) -> Moments<S> {
-        self.moments().0.at(t, carry, u, p)
+        self.moments().state.at(t, carry, u, p)
     }
 
     fn output_moments(&self, t: S, carry: &[S], u: &[S], p: &[S], _layout: &Layout) -> Moments<S> {
-        self.moments().1.at(t, carry, u, p)
+        self.moments().output.at(t, carry, u, p)
+    }
+
+    fn jumps(&self) -> bool {
+        Functions::<S>::jumps(&*self.equations)
+    }
+
+    fn jump(&self, t: S, x: &[S], u: &[S], p: &[S], to: &mut [S]) {
+        self.equations.jump(t, x, u, p, to);
+    }
+
+    fn jump_slopes(&self, t: S, x: &[S], u: &[S], p: &[S], to: &mut [S]) {
+        self.slopes().jump.at(t, x, u, p, to);
+    }
+
+    fn jump_moments(&self, t: S, carry: &[S], u: &[S], p: &[S], _layout: &Layout) -> Moments<S> {
+        self.moments().jump.at(t, carry, u, p)
     }
 }
 

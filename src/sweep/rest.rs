@@ -14,6 +14,8 @@ const STEPS: usize = 100;
 const HALVINGS: usize = 30;
 /// A step by this part of the state is the last but one: the next is by the square of it.
 const LAST: f64 = 1e-9;
+/// A jump below this part of the largest state or step is what the last step left.
+const JUMP: f64 = 1e-6;
 /// A singular value below this part of the largest, of slopes whose rows and columns are scaled, is rounding.
 const SINGULAR: f64 = 1e-13;
 
@@ -32,12 +34,22 @@ pub(super) struct Rest {
     inverse: DMatrix<f64>,
 }
 
-/// The rate of each state, in any numbers: zero at rest.
+/// The rate of each state, and what a sample changes of it, in any numbers: zero at rest.
 fn rate(filter: &Filter<'_>, between: &Between<Duals>, x: &[Duals], p: &[Duals], to: &mut [Duals]) {
     filter.duals.state(between.time(0.0), x, &between.input(0.0), p, to);
     if filter.layout.kind == Kind::Discrete {
         to.iter_mut().zip(x).for_each(|(to, x)| *to -= *x);
     }
+    if filter.duals.jumps() {
+        jumped(filter, between, x, p).iter().zip(to).for_each(|(jumped, to)| *to += *jumped);
+    }
+}
+
+/// What a sample changes of each state.
+fn jumped(filter: &Filter<'_>, between: &Between<Duals>, x: &[Duals], p: &[Duals]) -> Vec<Duals> {
+    let mut after = x.to_vec();
+    filter.duals.jump(between.time(0.0), x, &between.input(0.0), p, &mut after);
+    after.iter().zip(x).map(|(after, x)| *after - *x).collect()
 }
 
 impl Rest {
@@ -63,7 +75,13 @@ impl Rest {
             let shortest = LAST * longest.max(length(&x));
             longest = longest.max(length(&x)).max(length(step.as_slice()));
             if length(step.as_slice()) <= shortest {
-                return Ok(Rest { state: x, inverse });
+                // A rate that what the sample adds makes up for, such as of a first dose, is no rest.
+                let at_rest: Vec<Duals> = x.iter().map(|x| Dual::constant(*x)).collect();
+                let jumps: Vec<f64> = jumped(filter, &between, &at_rest, &p).iter().map(|jump| jump.value).collect();
+                return match length(&jumps) <= JUMP * longest {
+                    true => Ok(Rest { state: x, inverse }),
+                    false => Err(moving(&jumps)),
+                };
             }
             let shortened = (0..HALVINGS).find_map(|halvings| {
                 let part = 0.5f64.powi(halvings as i32);

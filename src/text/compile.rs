@@ -15,11 +15,9 @@ use std::sync::Arc;
 /// The equations of a document, and the order of its items.
 pub(super) fn compile(document: &Document, source: &Arc<Source>) -> Result<Equations, Vec<Remark>> {
     let mut compiler = Compiler::new(document, source)?;
-    let all = |expressions: Vec<&Expression>, compiler: &mut Compiler<'_>| -> Vec<Id> {
-        expressions.into_iter().filter_map(|one| compiler.lower(one)).collect()
-    };
-    let state = all(document.states.iter().map(|one| &one.rate).collect(), &mut compiler);
-    let output = all(document.outputs.iter().map(|one| &one.value).collect(), &mut compiler);
+    let state = compiler.rates(document);
+    let output = document.outputs.iter().filter_map(|one| compiler.lower(&one.value)).collect();
+    let jump = compiler.jumps(document);
     let diffusion = document.states.iter().map(|one| one.diffusion.as_ref());
     let diffusion = compiler.levels(diffusion, 0.0, "the diffusion", May::All);
     let noise = compiler.levels(document.outputs.iter().map(|one| one.noise.as_ref()), f64::NAN, "the noise", May::All);
@@ -32,7 +30,7 @@ pub(super) fn compile(document: &Document, source: &Arc<Source>) -> Result<Equat
     if !compiler.errors.is_empty() {
         return Err(compiler.errors);
     }
-    let roots = Roots { state, output, diffusion, noise, initial_noise, initial, delay };
+    let roots = Roots { state, output, diffusion, noise, initial_noise, initial, delay, jump };
     let made = Equations::complete(layout(document), &compiler.graph, &roots);
     made.map_err(|wrong| vec![Remark::error(source, 0..0, wrong.to_string())])
 }
@@ -133,6 +131,35 @@ impl<'d> Compiler<'d> {
                 .help("define it under [let]".to_owned()),
         };
         self.errors.push(remark);
+    }
+
+    /// The derivative or next value of each state; zero of one that samples alone change.
+    fn rates(&mut self, document: &Document) -> Vec<Id> {
+        let mut found = vec![];
+        for state in &document.states {
+            let id = match &state.rate {
+                Some(rate) => self.lower(rate),
+                None => Some(self.graph.constant(0.0)),
+            };
+            found.extend(id);
+        }
+        found
+    }
+
+    /// Each state after a sample; none if samples change no state.
+    fn jumps(&mut self, document: &Document) -> Vec<Id> {
+        if document.states.iter().all(|state| state.jump.is_none()) {
+            return vec![];
+        }
+        let mut found = vec![];
+        for (i, state) in (0..).zip(&document.states) {
+            let id = match &state.jump {
+                Some(jump) => self.lower(jump),
+                None => Some(self.graph.leaf(Leaf::State(i))),
+            };
+            found.extend(id);
+        }
+        found
     }
 
     /// One level for each, where one is given, which is not negative.

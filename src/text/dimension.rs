@@ -56,10 +56,17 @@ pub(super) fn check(document: &Document, source: &Arc<Source>) -> Vec<Remark> {
             if per_second { format!("{}{over}", state.quantity.unit) } else { state.quantity.unit.clone() }
         };
         let name = &state.quantity.name;
-        let found = checker.unit(&state.rate);
+        let of_rate = state.rate.as_ref().map(|rate| (rate, checker.unit(rate)));
+        let of_jump = state.jump.as_ref().map(|jump| (jump, checker.unit(jump)));
         if let Some(unit) = &state.quantity.dimension {
-            let what = if per_second { format!("the derivative of `{name}`") } else { format!("the next `{name}`") };
-            checker.compare(&state.rate, found, &rate(unit, 1.0), &what, &said("/s"));
+            if let Some((expression, found)) = of_rate {
+                let what =
+                    if per_second { format!("the derivative of `{name}`") } else { format!("the next `{name}`") };
+                checker.compare(expression, found, &rate(unit, 1.0), &what, &said("/s"));
+            }
+            if let Some((jump, found)) = of_jump {
+                checker.compare(jump, found, unit, &format!("`{name}` after a sample"), &state.quantity.unit);
+            }
             if let Some(diffusion) = &state.diffusion {
                 let found = checker.unit(diffusion);
                 checker.compare(

@@ -70,8 +70,10 @@ pub(super) enum Begin {
 #[derive(Clone, Debug)]
 pub(super) struct State {
     pub quantity: Declared,
-    /// The derivative, or the next state.
-    pub rate: Expression,
+    /// The derivative, or the next state; `None` of a state that samples alone change.
+    pub rate: Option<Expression>,
+    /// The state after a sample, where that changes it.
+    pub jump: Option<Expression>,
     pub begin: Option<(Begin, Span)>,
     pub diffusion: Option<Expression>,
     /// Standard deviation at the first sample.

@@ -37,7 +37,10 @@ impl Model {
                 Kind::Discrete => format!("{x}[k+1]"),
                 _ => format!("\\frac{{d{x}}}{{dt}}"),
             };
-            lines.push(format!("{left} &= {}", formula(&state.rate)));
+            lines.push(format!("{left} &= {}", state.rate.as_ref().map_or("0".to_owned(), formula)));
+            if let Some(jump) = &state.jump {
+                lines.push(format!("{x}(t_k^+) &= {}", formula(jump)));
+            }
         }
         for one in &document.definitions {
             lines.push(format!("{} &= {}", symbol(&one.quantity.name), formula(&one.value)));

@@ -207,10 +207,10 @@ impl Module<'_> {
         }
         let full = "_t: S, _x: &Of<Self::State, S>, _u: &Of<Self::Input, S>, _p: &Of<Self::Parameters, S>";
         let rates: Vec<(&str, Option<&Expression>)> =
-            document.states.iter().map(|one| (one.quantity.name.as_str(), Some(&one.rate))).collect();
+            document.states.iter().map(|one| (one.quantity.name.as_str(), one.rate.as_ref())).collect();
         if document.kind != Kind::Static {
             let function = if document.kind == Kind::Discrete { "next" } else { "derivative" };
-            self.function(&mut text, (function, "State", full), &rates, "");
+            self.function(&mut text, (function, "State", full), &rates, "S::from(0.0)");
         }
         let outputs: Vec<_> =
             document.outputs.iter().map(|one| (one.quantity.name.as_str(), Some(&one.value))).collect();
@@ -225,6 +225,8 @@ impl Module<'_> {
                 }
             };
         let states = || document.states.iter();
+        let jump = states().map(|one| (&one.quantity, one.jump.as_ref()));
+        levels(("jump", "State", full), jump.collect(), "x.{name}");
         let diffusion = states().map(|one| (&one.quantity, one.diffusion.as_ref()));
         levels(("diffusion", "State", full), diffusion.collect(), "S::from(0.0)");
         let noise = document.outputs.iter().map(|one| (&one.quantity, one.noise.as_ref()));
@@ -238,7 +240,7 @@ impl Module<'_> {
         text + "}\n"
     }
 
-    /// A function of the model: the definitions that it needs, then its vector.
+    /// A function of the model: the definitions that it needs, then its vector, with `unsaid` for an entry (`{name}`) that has no value.
     fn function(
         &self,
         text: &mut String,
@@ -257,7 +259,7 @@ impl Module<'_> {
             }
         }
         let value = |(name, value): &(&str, Option<&Expression>)| {
-            let code = value.map_or_else(|| unsaid.to_owned(), |value| arithmetic.scalar(value));
+            let code = value.map_or_else(|| unsaid.replace("{name}", name), |value| arithmetic.scalar(value));
             format!("            {name}: {code},")
         };
         let fields: Vec<String> = entries.iter().map(value).collect();

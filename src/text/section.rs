@@ -22,7 +22,8 @@ impl From<&Model> for Section {
         for state in &document.states {
             let name = &state.quantity.name;
             let left = if document.kind == Kind::Discrete { format!("next {name}") } else { format!("d {name}/dt") };
-            rows.push((left, model.written(&state.rate)));
+            rows.push((left, state.rate.as_ref().map_or("0".to_owned(), |rate| model.written(rate))));
+            rows.extend(state.jump.as_ref().map(|jump| (format!("{name} after a sample"), model.written(jump))));
         }
         for one in &document.definitions {
             rows.push((one.quantity.name.clone(), model.written(&one.value)));

@@ -16,12 +16,12 @@ pub(super) fn file(equations: &Equations, name: &str, parameters: &[Parameter]) 
     let layout = equations.layout();
     check(layout, parameters)?;
     let (shared, table) = (free_word(layout, "_"), free_word(layout, "table"));
-    let Roots { state, output, diffusion, noise, initial_noise, initial, delay } = equations.roots();
-    let counts = [state, output, diffusion, noise, initial_noise, initial, delay].map(Vec::len);
+    let Roots { state, output, diffusion, noise, initial_noise, initial, delay, jump } = equations.roots();
+    let counts = [state, output, diffusion, noise, initial_noise, initial, delay, jump].map(Vec::len);
     let lines = lines(equations, [&shared, &table]);
     let (definitions, roots) = lines.split_at(lines.len() - counts.iter().sum::<usize>());
     let mut rest = roots.iter().map(|(_, text)| text.as_str());
-    let [rates, outputs, diffusion, noise, initial_noise, initial, delay] =
+    let [rates, outputs, diffusion, noise, initial_noise, initial, delay, jump] =
         counts.map(|count| rest.by_ref().take(count).collect::<Vec<&str>>());
 
     let mut file = Writer { text: String::from("greybox = 1\n") };
@@ -41,13 +41,16 @@ pub(super) fn file(equations: &Equations, name: &str, parameters: &[Parameter]) 
     }
     file.group("let", definitions.iter().map(|(name, text)| (name.as_str(), quoted(text))));
     let key = if layout.kind == Kind::Discrete { "next" } else { "derivative" };
+    let jumping = equations.jumping();
     let state = |(i, (one, rate)): (usize, (&'_ Quantity, &&str))| {
         let level =
             |name: &str, of: &[&str]| of.get(i).map_or(String::new(), |level| format!(", {name} = {}", quoted(level)));
         let begin = initial.get(i).filter(|initial| **initial != "nan");
         let begin = begin.map_or(String::new(), |initial| format!(", initial = {}", quoted(initial)));
         let levels = begin + &level("diffusion", &diffusion) + &level("initial_noise", &initial_noise);
-        (one.name.clone(), format!("{{ unit = {}, {key} = {}{levels} }}", unit(one), quoted(rate)))
+        let jump = jump.get(i).filter(|_| jumping[i].is_some());
+        let jump = jump.map_or(String::new(), |jump| format!(", jump = {}", quoted(jump)));
+        (one.name.clone(), format!("{{ unit = {}, {key} = {}{jump}{levels} }}", unit(one), quoted(rate)))
     };
     file.group("states", layout.states.iter().zip(&rates).enumerate().map(state));
     let output = |(i, (one, value)): (usize, (&'_ Quantity, &&str))| {

@@ -9,6 +9,7 @@ mod given_noise;
 #[path = "../common/hardening.rs"]
 mod hardening;
 mod initial;
+mod jumps;
 mod missing_terms;
 mod moving_levels;
 mod process_noise;

@@ -1,7 +1,7 @@
 //! What is declared of parameters holds, and what has no effect is refused.
 
 use crate::shared::shared;
-use greybox::models::{AxisParameters, ControlledAxisMotion, PositioningLoop};
+use greybox::models::{AxisMotion, AxisParameters, Command, ControlledAxisOutput, Positioning, Reference};
 use greybox::*;
 
 signals! { pub struct Push { u: "N" } }
@@ -90,21 +90,59 @@ fn no_interval_reaches_beyond_bounds() {
     assert_eq!(held.knowledge.f, Knowledge::Held { bound: at(0.5), end: Some(at(0.6)) }, "{held}");
 }
 
+signals! { pub struct LaggingMotion { q: "m", v: "m/s", vm: "m/s" } }
+
+/// The axis of the benchmark EMPS under a controller in continuous time, whose speed lags by 1 ms.
+#[derive(Clone)]
+struct LaggingLoop;
+
+impl LaggingLoop {
+    fn command<S: Scalar>(x: &LaggingMotion<S>, u: &Reference<S>) -> S {
+        (((u.qg - x.q) * 160.18 - x.vm) * 243.45).clamp(-10.0, 10.0)
+    }
+}
+
+impl Model for LaggingLoop {
+    type State = LaggingMotion;
+    type Input = Reference;
+    type Output = ControlledAxisOutput;
+    type Parameters = AxisParameters;
+    fn derivative<S: Scalar>(
+        &self,
+        t: S,
+        x: &LaggingMotion<S>,
+        u: &Reference<S>,
+        p: &AxisParameters<S>,
+    ) -> LaggingMotion<S> {
+        let vir = Self::command(x, u);
+        let axis = Positioning::EMPS.derivative(t, &AxisMotion { q: x.q, v: x.v }, &Command { vir }, p);
+        LaggingMotion { q: axis.q, v: axis.v, vm: (x.v - x.vm) * 1e3 }
+    }
+    fn output<S: Scalar>(
+        &self,
+        _t: S,
+        x: &LaggingMotion<S>,
+        u: &Reference<S>,
+        _p: &AxisParameters<S>,
+    ) -> ControlledAxisOutput<S> {
+        ControlledAxisOutput { qm: x.q, vir: Self::command(x, u) }
+    }
+}
+
 #[test]
 fn the_wrong_hold_of_the_benchmark_is_not_usable() {
     let Some(path) = shared("emps/emps.csv") else { return };
-    let model = PositioningLoop::EMPS;
-    let rest = ControlledAxisMotion { q: free(0.0), v: fixed(0.0), vm: fixed(0.0) };
+    let rest = LaggingMotion { q: free(0.0), v: fixed(0.0), vm: fixed(0.0) };
     let axis = AxisParameters {
         m: free(80.0).positive(),
         fv: free(150.0).positive(),
         fc: free(15.0).positive(),
         offset: free(0.0),
     };
-    let record = Experiment::from_file(&model, path).unwrap().initial(rest);
-    let wrong = Fit::new(&model, &record).parameters(axis).run().unwrap();
+    let record = Experiment::from_file(&LaggingLoop, path).unwrap().initial(rest);
+    let wrong = Fit::new(&LaggingLoop, &record).parameters(axis).run().unwrap();
     assert!(wrong.severity() == Severity::NotUsable && wrong.parameters.fv < 0.0, "{wrong}");
-    let right = Fit::new(&model, &record.hold(Hold::First)).parameters(axis).run().unwrap();
+    let right = Fit::new(&LaggingLoop, &record.hold(Hold::First)).parameters(axis).run().unwrap();
     assert!(right.warnings.iter().all(|warning| warning.code != WarningCode::NotPositive), "{right}");
 }
 

@@ -222,7 +222,7 @@ fn a_horizon_beyond_a_segment_counts_each_measurement_once() {
     }
 }
 
-/// The axis of the benchmark EMPS with its dry friction, under its controller; `whole` as for [`Plant`].
+/// The axis of the benchmark EMPS with its dry friction, under its digital controller; `whole` as for [`Plant`].
 struct Axis {
     whole: bool,
 }
@@ -246,6 +246,20 @@ impl Model for Axis {
         PositioningLoop::EMPS.derivative(t, x, u, p)
     }
 
+    fn jump<S: Scalar>(
+        &self,
+        t: S,
+        x: &ControlledAxisMotion<S>,
+        u: &Reference<S>,
+        p: &AxisParameters<S>,
+    ) -> ControlledAxisMotion<S> {
+        PositioningLoop::EMPS.jump(t, x, u, p)
+    }
+
+    fn initial<S: Scalar>(&self, u: &Reference<S>, p: &AxisParameters<S>) -> ControlledAxisMotion<S> {
+        PositioningLoop::EMPS.initial(u, p)
+    }
+
     fn output<S: Scalar>(
         &self,
         t: S,
@@ -263,14 +277,13 @@ fn an_axis_with_dry_friction_is_fitted_in_segments() {
     let place =
         |k: usize| 0.1 + 0.05 * (0.5 - 0.5 * (0.006 * k as f64).cos()) * f64::from(u8::from(k / 1_047 % 3 != 1));
     let inputs: Vec<_> = (0..4_200).map(|k| Reference { qg: place(k) }).collect();
-    let rest = ControlledAxisMotion { q: 0.1, v: 0.0, vm: 0.0 };
+    let rest = ControlledAxisMotion { q: 0.1, v: 0.0, moved: 0.0, before: 0.0, held: 0.0 };
     let (truth, time) =
         (AxisParameters { m: 95.0, fv: 200.0, fc: 20.0, offset: -3.0 }, Time::Uniform { start: 0.0, step: 1e-3 });
     let model = Axis { whole: false };
     let run = Simulator::new(&model).hold(Hold::First).run(&truth, &rest, time, &inputs).unwrap();
     let noise = ControlledAxisOutput { qm: 1e-6, vir: 0.05 };
     let record = run.with_noise(noise, 3).experiment(&model).unwrap();
-    let record = record.initial(ControlledAxisMotion { q: free(0.1), v: fixed(0.0), vm: fixed(0.0) });
     for [m, fv, fc] in [[80.0, 150.0, 15.0], [150.0, 400.0, 40.0], [60.0, 60.0, 60.0]] {
         let fit = |whole: bool| {
             let start = AxisParameters { m: free(m), fv: free(fv), fc: free(fc), offset: free(0.0) };

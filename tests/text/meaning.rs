@@ -206,6 +206,45 @@ fn kinds_and_what_is_declared() {
     assert_eq!((fixed_output.noise(), fixed_output.initial()), (vec![Some(0.1)], Initial::Estimated));
 }
 
+/// A state with `jump` alone is held, one with both follows its derivative; what is written of the equations, as a file, JSON and Rust, says the same.
+#[test]
+fn states_that_jump() {
+    let text = "greybox = 1\noutputs = [\"x\"]\n[inputs]\nr = \"V\"\ndose = \"V\"\n[parameters]\na = { unit = \"1/s\", start = 0.5 }\nk = { start = 0.4 }\n\
+                [states]\nz = { unit = \"V\", jump = \"z + k*(r - x)\", initial = 0 }\n\
+                x = { unit = \"V\", derivative = \"a*(z - x)\", jump = \"x + dose\" }\nw = { unit = \"V\", derivative = \"-a*w\" }";
+    let sampled = model(text);
+    assert!(sampled.warnings().is_empty(), "{:?}", sampled.warnings());
+    let values = |of: &greybox::equations::Equations| {
+        let roots = [&*of.roots().state, &of.roots().jump].concat();
+        of.graph().evaluate::<f64>(&roots, |leaf| match leaf {
+            Leaf::State(i) => [0.3, 0.2, 0.9][i as usize],
+            Leaf::Input(i) => [1.0, 0.1][i as usize],
+            Leaf::Parameter(i) => [0.5, 0.4][i as usize],
+            _ => f64::NAN,
+        })
+    };
+    let expected = [0.0, 0.5 * (0.3 - 0.2), -0.45, 0.3 + 0.4 * (1.0 - 0.2), 0.2 + 0.1, 0.9];
+    let equations = sampled.equations();
+    let again = Model::of(equations, "model", sampled.parameters()).unwrap();
+    let json = serde_json::to_string(&**equations).unwrap();
+    assert_eq!(serde_json::from_str::<greybox::equations::Equations>(&json).unwrap(), **equations);
+    for found in [values(equations), values(again.equations())] {
+        assert!(found.iter().zip(expected).all(|(found, expected)| (found - expected).abs() < 1e-15), "{found:?}");
+    }
+    let code = sampled.to_rust().unwrap();
+    let function = code.split("fn jump").nth(1).unwrap();
+    assert!(function.contains("z: x.z + p.k * (u.r - x.x),") && function.contains("w: x.w,"), "{function}");
+    assert!(code.contains("z: S::from(0.0),"), "{code}");
+    assert!(equations.to_string().contains("x after a sample = x + dose"), "{equations}");
+    assert!(sampled.to_latex().contains("x(t_k^+) &= x + "), "{}", sampled.to_latex());
+    assert!(!equations.to_string().contains("w after"));
+    let wrong = Model::named("m", &text.replace("derivative", "next")).unwrap_err().to_string();
+    assert!(wrong.contains("has `jump`, but the model is discrete") && wrong.contains("by `next` alone"), "{wrong}");
+    let warned = model(&text.replace("x + dose", "x + dose*a"));
+    let warned = warned.warnings().iter().map(|one| one.title().to_owned()).collect::<Vec<_>>();
+    assert!(warned.iter().any(|title| title.contains("V") && title.contains("V/s")), "{warned:?}");
+}
+
 /// A constant that is set has its new value in the equations and in the file; comments stay.
 #[test]
 fn constants_are_set() {

@@ -239,8 +239,8 @@ fn shipped_axes_run_on_lanes() {
     let command = swing::<Command>(Command { vir: 2.0 }, 60);
     agrees::<_, _, 6>(&Positioning::EMPS, &rk4, Hold::Zero, AxisMotion { q: 0.1, v: 0.0 }, axis, &command, 1e-3);
     let reference = swing::<Reference>(Reference { qg: 0.1 }, 60);
-    let start = ControlledAxisMotion { q: 0.1, v: 0.0, vm: 0.0 };
-    agrees::<_, _, 7>(&PositioningLoop::EMPS, &rk4, Hold::First, start, axis, &reference, 1e-3);
+    let start = ControlledAxisMotion { q: 0.1, v: 0.0, moved: 0.0, before: 0.0, held: 0.0 };
+    agrees::<_, _, 9>(&PositioningLoop::EMPS, &rk4, Hold::First, start, axis, &reference, 1e-3);
 }
 
 model! { AsksForValues, Kind::Continuous, |_t, x, _u, _p| Pair { a: x.a * x.b.value(), b: x.b }, *x }

@@ -61,7 +61,7 @@ impl Reader {
     pub(super) fn state(&mut self, entry: &Entry<'_>, kind: Kind) -> Option<State> {
         let (key, other) = if kind == Kind::Discrete { ("next", "derivative") } else { ("derivative", "next") };
         let (quantity, fields) =
-            self.in_table(entry, "a state", &["derivative", "next", "initial", "diffusion", "initial_noise"])?;
+            self.in_table(entry, "a state", &["derivative", "next", "jump", "initial", "diffusion", "initial_noise"])?;
         if let Some(found) = field(&fields, other) {
             let title = format!("state `{}` has `{other}`, another has `{key}`", entry.key);
             let remark = Remark::error(&self.values.source, found.at.clone(), title);
@@ -76,8 +76,19 @@ impl Reader {
         let [diffusion, initial_noise] = ["diffusion", "initial_noise"].map(|key| field(&fields, key));
         let diffusion = self.values.optional(diffusion)?;
         let initial_noise = self.values.optional(initial_noise)?;
-        let rate = self.required(entry, &fields, key, "state")?;
-        Some(State { quantity, rate, begin, diffusion, initial_noise })
+        let jump = field(&fields, "jump");
+        if let (Some(found), Kind::Discrete) = (jump, kind) {
+            let title = format!("state `{}` has `jump`, but the model is discrete", entry.key);
+            let remark = Remark::error(&self.values.source, found.at.clone(), title);
+            self.values.errors.push(remark.help("a discrete model changes its states by `next` alone".to_owned()));
+            return None;
+        }
+        let jump = self.values.optional(jump)?;
+        let rate = match (&jump, field(&fields, key)) {
+            (Some(_), None) => None,
+            _ => Some(self.required(entry, &fields, key, "state")?),
+        };
+        Some(State { quantity, rate, jump, begin, diffusion, initial_noise })
     }
 
     /// `outputs = ["id", "iq"]` of states or inputs, or a table.

@@ -10,8 +10,12 @@ signals! {
         q: "m",
         /// v
         v: "m/s",
-        /// vm
-        vm: "m/s",
+        /// since the last sample
+        moved: "m",
+        /// in the interval before
+        before: "m",
+        /// command, until the next sample
+        held: "V",
     }
     /// Inputs.
     pub struct LinearAxisUnderItsControllerInput {
@@ -41,8 +45,6 @@ signals! {
 /// Linear axis under its controller.
 ///
 /// Position and command of a linear axis under a position and speed controller; the Rust twin is models::PositioningLoop.
-///
-/// Records are to hold `qg` by `Hold::First`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LinearAxisUnderItsController {
     /// force per command (N/V)
@@ -55,8 +57,8 @@ pub struct LinearAxisUnderItsController {
     pub kv: f64,
     /// largest command (V)
     pub limit: f64,
-    /// lag of the speed that the controller measures (s)
-    pub lag: f64,
+    /// sampling time of the controller, which is that of the record (s)
+    pub ts: f64,
 }
 
 impl Default for LinearAxisUnderItsController {
@@ -67,7 +69,7 @@ impl Default for LinearAxisUnderItsController {
             kp: 160.18,
             kv: 243.45,
             limit: 10.0,
-            lag: 0.001,
+            ts: 0.001,
         }
     }
 }
@@ -79,21 +81,47 @@ impl Model for LinearAxisUnderItsController {
     type Parameters = LinearAxisUnderItsControllerParameters;
 
     #[inline]
-    fn derivative<S: Scalar>(&self, _t: S, x: &Of<Self::State, S>, u: &Of<Self::Input, S>, p: &Of<Self::Parameters, S>) -> Of<Self::State, S> {
-        let vir = (((u.qg - x.q) * self.kp - x.vm) * self.kv).clamp(-self.limit, self.limit);
+    fn derivative<S: Scalar>(&self, _t: S, x: &Of<Self::State, S>, _u: &Of<Self::Input, S>, p: &Of<Self::Parameters, S>) -> Of<Self::State, S> {
         LinearAxisUnderItsControllerState {
             q: x.v,
-            v: (vir * self.gtau - p.fv * x.v - p.fc * (x.v / self.width).tanh() - p.offset) / p.m,
-            vm: (x.v - x.vm) / self.lag,
+            v: (x.held * self.gtau - p.fv * x.v - p.fc * (x.v / self.width).tanh() - p.offset) / p.m,
+            moved: x.v,
+            before: S::from(0.0),
+            held: S::from(0.0),
         }
     }
 
     #[inline]
     fn output<S: Scalar>(&self, _t: S, x: &Of<Self::State, S>, u: &Of<Self::Input, S>, _p: &Of<Self::Parameters, S>) -> Of<Self::Output, S> {
-        let vir = (((u.qg - x.q) * self.kp - x.vm) * self.kv).clamp(-self.limit, self.limit);
+        let vm = (x.moved + x.before) / (2.0 * self.ts);
+        let vir = (((u.qg - x.q) * self.kp - vm) * self.kv).clamp(-self.limit, self.limit);
         LinearAxisUnderItsControllerOutput {
             qm: x.q,
             vir: vir,
+        }
+    }
+
+    #[inline]
+    fn jump<S: Scalar>(&self, _t: S, x: &Of<Self::State, S>, u: &Of<Self::Input, S>, _p: &Of<Self::Parameters, S>) -> Of<Self::State, S> {
+        let vm = (x.moved + x.before) / (2.0 * self.ts);
+        let vir = (((u.qg - x.q) * self.kp - vm) * self.kv).clamp(-self.limit, self.limit);
+        LinearAxisUnderItsControllerState {
+            q: x.q,
+            v: x.v,
+            moved: S::from(0.0),
+            before: x.moved,
+            held: vir,
+        }
+    }
+
+    #[inline]
+    fn initial<S: Scalar>(&self, _u: &Of<Self::Input, S>, _p: &Of<Self::Parameters, S>) -> Of<Self::State, S> {
+        LinearAxisUnderItsControllerState {
+            q: S::from(f64::NAN),
+            v: S::from(0.0),
+            moved: S::from(0.0),
+            before: S::from(0.0),
+            held: S::from(0.0),
         }
     }
 }
