@@ -80,6 +80,8 @@ pub trait Plant<S> {
 pub(crate) struct Between<S> {
     /// Begin and length (s).
     interval: (f64, f64),
+    /// The length that its transition is computed for (s).
+    crossed: f64,
     u0: Vec<S>,
     /// The input at the end; `None` where it is held.
     u1: Option<Vec<S>>,
@@ -95,10 +97,10 @@ impl<S: Scalar> Between<S> {
         let t0 = record.time(k);
         let last = k + 1 >= record.len();
         let length = if last { 0.0 } else { record.time(k + 1) - t0 };
-        let (interval, part) = ((t0, length), Cell::new(None));
+        let (interval, crossed, part) = ((t0, length), length, Cell::new(None));
         if !delays.is_empty() {
             let (u0, parts) = (record.late_inputs(k, delays), record.parts(k, delays));
-            return Between { interval, u0, u1: None, parts, part };
+            return Between { interval, crossed, u0, u1: None, parts, part };
         }
         let u0 = record.input(k);
         let at_end = |(i, u0): (usize, &f64)| match record.input_hold(i) {
@@ -107,7 +109,12 @@ impl<S: Scalar> Between<S> {
         };
         let moves = !record.holds.all_zero() && !last;
         let u1 = moves.then(|| u0.iter().enumerate().map(at_end).collect());
-        Between { interval, u0: u0.into_iter().map(S::from).collect(), u1, parts: vec![], part }
+        Between { interval, crossed, u0: u0.into_iter().map(S::from).collect(), u1, parts: vec![], part }
+    }
+
+    /// Crossed by the transition over this length (s), which all have that differ by rounding.
+    pub fn crossed_as(self, length: f64) -> Self {
+        Between { crossed: length, ..self }
     }
 
     /// How long it is (s).
@@ -115,13 +122,13 @@ impl<S: Scalar> Between<S> {
         self.interval.1
     }
 
-    fn crossed(&self) -> Option<&Part<S>> {
+    fn part(&self) -> Option<&Part<S>> {
         self.part.get().and_then(|i| self.parts.get(i))
     }
 
     /// Time at a fraction of the interval, or of the part that is being crossed (s).
     pub fn time(&self, position: f64) -> S {
-        match self.crossed() {
+        match self.part() {
             Some(part) => part.length * position + part.t0,
             None => S::from(self.interval.0 + position * self.interval.1),
         }
@@ -129,7 +136,7 @@ impl<S: Scalar> Between<S> {
 
     /// The input there.
     pub fn input(&self, position: f64) -> Vec<S> {
-        let (u0, u1) = match self.crossed() {
+        let (u0, u1) = match self.part() {
             Some(part) => (&part.u0, Some(&part.u1)),
             None => (&self.u0, self.u1.as_ref()),
         };
@@ -195,7 +202,7 @@ impl<S: Stepped> SlicePlant<'_, S> {
         if !self.method.is_exact() {
             return None;
         }
-        let (n, length) = (self.layout.states.len(), self.between.length());
+        let (n, length) = (self.layout.states.len(), self.between.crossed);
         if let Some((_, known)) = self.intervals.crossings.borrow().iter().find(|(known, _)| *known == length) {
             return Some(known.clone());
         }

@@ -8,6 +8,7 @@ mod extended;
 mod given_noise;
 #[path = "../common/hardening.rs"]
 mod hardening;
+mod house;
 mod initial;
 mod missing_terms;
 mod moving_levels;
@@ -17,4 +18,5 @@ mod simulated;
 mod simulates;
 mod smoothed;
 mod two_sensors;
+mod uneven;
 mod walls;
