@@ -37,7 +37,7 @@ use crate::parameter::Parameter;
 use crate::predict::Predictor;
 use crate::prefilter::Butterworth;
 use crate::problem::{Lead, Noise, Problem, Search, SearchPlan, Settings};
-use crate::record::{Record, Time};
+use crate::record::Record;
 use crate::weighting::Weighting;
 use argmin::core::observers::{Observe, ObserverMode};
 use core::marker::PhantomData;
@@ -148,8 +148,8 @@ impl<'a, M: Made> Fit<'a, M> {
 
     /// Sets the integrator. It is kept, with a warning if its step moves the answer.
     ///
-    /// Without it, a fit of a continuous model begins with [`Rk4`](crate::Rk4), one step per sample (a filter of linear equations with evenly
-    /// spaced samples takes their exact transition, [`Kalman`](crate::Kalman)). While a finer step would move an
+    /// Without it, a fit of a continuous model begins with [`Rk4`](crate::Rk4), one step per sample (a filter of linear equations takes their
+    /// exact transition, [`Kalman`](crate::Kalman)). While a finer step would move an
     /// unknown by more than a tenth of its standard error, where the start cannot be simulated, or where a search that did not
     /// converge had a cost that a finer step changes, it takes 4, 16, 64 and 256 steps per sample, then [`Esdirk`](crate::Esdirk); the estimate
     /// names the method ([`Method::integrator`](crate::estimate::Method)), and is not usable if none is fine enough. A finer step
@@ -385,8 +385,7 @@ impl<'a, M: Made> Fit<'a, M> {
         M: 'm,
     {
         let (chosen, predictor) = (self.stepping.as_ref(), self.predictor.as_ref());
-        let evenly = self.records.iter().all(|record| matches!(record.times(), Time::Uniform { .. }));
-        let stepping = fittable::stepping(&*model, chosen, predictor, evenly);
+        let stepping = fittable::stepping(&*model, chosen, predictor);
         let sweep = M::sweep(model.clone(), stepping.as_ref(), predictor)?;
         let problem = Problem::new(sweep, self.records, &self.parameters, self.settings)?;
         Ok(problem.refining(fittable::finer(model, stepping.as_ref(), predictor)))

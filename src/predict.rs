@@ -1,5 +1,6 @@
 //! [`Predictor`]: mean and variance of each output, and the state from which they are computed.
 
+mod between;
 mod free_run;
 mod gaussian;
 mod given_noise;
@@ -13,6 +14,7 @@ mod starting;
 mod symbolic;
 
 pub use crate::moments::Moments;
+pub(crate) use between::Between;
 pub use free_run::FreeRun;
 pub use given_noise::GivenNoise;
 pub use horizon::Horizon;
@@ -21,7 +23,7 @@ pub use kalman::Kalman;
 pub use measured::Guess;
 pub(crate) use measured::Place;
 pub use plant::Plant;
-pub(crate) use plant::{Between, Intervals, SlicePlant, Stepped, jacobian};
+pub(crate) use plant::{Intervals, SlicePlant, Stepped, jacobian};
 pub use second_order::SecondOrder;
 pub use starting::Starting;
 pub(crate) use symbolic::{numbers, recurrence};

@@ -8,6 +8,7 @@ mod edit;
 mod file;
 mod holds;
 mod inspect;
+mod lengths;
 #[cfg(feature = "npy")]
 mod npy;
 mod stored;
@@ -21,6 +22,7 @@ pub use file::{DataFile, DateOrder, FileFormat, Reading, TimeSource};
 pub(crate) use holds::Holds;
 pub(crate) use inspect::Looked;
 pub use inspect::{ChannelInspection, Inspection, Suspicion};
+pub(crate) use lengths::Lengths;
 pub(crate) use stored::Stored;
 #[cfg(feature = "csv")]
 pub(crate) use time::Clock;

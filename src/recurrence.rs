@@ -68,7 +68,7 @@ impl Recurrence {
         Recurrence { started, ..self }
     }
 
-    /// This recurrence, with numbers that follow from its parameters and the time between two samples, which is the same everywhere.
+    /// This recurrence, with numbers that follow from its parameters and the time between two samples.
     pub(crate) fn with_following(self, following: Vec<Following>) -> Self {
         Recurrence { following, ..self }
     }

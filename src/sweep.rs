@@ -32,10 +32,10 @@ use crate::equations::{Diffusion, Term};
 use crate::error::{Error, Failure};
 use crate::layout::Layout;
 use crate::predict::GivenNoise;
-use crate::record::Record;
+use crate::record::{Lengths, Record};
 use std::borrow::Cow;
 use std::ops::Range;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 /// Quantities that a sweep computes from a record before the search.
 #[derive(Clone, Debug, Default)]
@@ -46,6 +46,15 @@ pub struct Prepared {
     pub(crate) derived: Derived,
     /// Columns of records that programs run side by side.
     pub(crate) interleaved: Interleaved,
+    /// The lengths of its intervals, where they are crossed exactly.
+    pub(crate) lengths: Arc<OnceLock<Lengths>>,
+}
+
+impl Prepared {
+    /// The lengths of the intervals of its record.
+    pub(crate) fn lengths(&self, record: &Record) -> &Lengths {
+        self.lengths.get_or_init(|| Lengths::of(record))
+    }
 }
 
 /// Consecutive samples of a record, with the carry at the first of them.

@@ -132,7 +132,7 @@ impl Group {
     }
 
     /// Sets negligible slopes to zero.
-    pub(crate) fn clear_negligible(&mut self) {
+    fn clear_negligible(&mut self) {
         let (values, carried, lanes) = (self.program.pattern.rows.len(), self.program.code.carried, self.lanes());
         for slope in &mut self.numbers[values * lanes..carried * lanes] {
             if slope.abs() < NEGLIGIBLE {

@@ -84,16 +84,14 @@ pub trait Made: Fittable {
         Self: 'a;
 }
 
-/// The integrator that was chosen; else, for a filter of linear equations, their transition, where samples are evenly spaced. `None`: the default
-/// one.
+/// The integrator that was chosen; else, for a filter of linear equations, their transition. `None`: the default one.
 pub(super) fn stepping<M: Made>(
     model: &M,
     chosen: Option<&M::Stepping>,
     predictor: Option<&Predicting>,
-    evenly: bool,
 ) -> Option<M::Stepping> {
     let is_filter = predictor.is_some_and(|Predicting(predictor)| predictor.is_filter());
-    chosen.cloned().or_else(|| (is_filter && evenly).then(|| model.exact()).flatten())
+    chosen.cloned().or_else(|| is_filter.then(|| model.exact()).flatten())
 }
 
 /// Whether a predictor, a simulation if there is none, takes the transition of linear equations where it is there.

@@ -9,7 +9,7 @@ use crate::error::Error;
 use crate::estimate::Summary;
 use crate::parameter::Parameter;
 use crate::problem::{FinerSweeps, Problem, Settings};
-use crate::record::{Record, Time};
+use crate::record::Record;
 use crate::sweep::Sweep;
 use core::marker::PhantomData;
 use std::collections::VecDeque;
@@ -34,17 +34,10 @@ pub struct Fleet<'a, M> {
 /// A fleet whose quantities are known by position.
 #[derive(Clone)]
 struct Fits<'a> {
-    /// Of evenly spaced samples, and of others.
-    even: Sweeps<'a>,
-    uneven: Sweeps<'a>,
+    sweep: Arc<dyn Sweep + 'a>,
+    finer: Arc<FinerSweeps<'a>>,
     parameters: Vec<Parameter>,
     settings: Settings,
-}
-
-#[derive(Clone)]
-struct Sweeps<'a> {
-    first: Arc<dyn Sweep + 'a>,
-    finer: Arc<FinerSweeps<'a>>,
 }
 
 impl<'a, M: Made> Fit<'a, M> {
@@ -55,17 +48,10 @@ impl<'a, M: Made> Fit<'a, M> {
     /// checkpoint, observers).
     pub fn fleet(self) -> Result<Fleet<'a, M>, Error> {
         let (model, predictor) = (self.model.lent(), self.predictor.as_ref());
-        let chosen = self.stepping.as_ref();
-        let stepping = |evenly: bool| stepping(&*model, chosen, predictor, evenly);
-        let sweeps = |stepping: Option<M::Stepping>| -> Result<Sweeps<'a>, Error> {
-            let first = M::sweep(model.clone(), stepping.as_ref(), predictor)?;
-            Ok(Sweeps { first, finer: finer(model.clone(), stepping.as_ref(), predictor) })
-        };
-        let of_even = stepping(true);
-        let is_crossed = chosen.is_none() && of_even.is_some();
-        let even = sweeps(of_even)?;
-        let uneven = if is_crossed { sweeps(stepping(false))? } else { even.clone() };
-        let fits = Fits { even, uneven, parameters: self.parameters, settings: self.settings };
+        let stepping = stepping(&*model, self.stepping.as_ref(), predictor);
+        let sweep = M::sweep(model.clone(), stepping.as_ref(), predictor)?;
+        let finer = finer(model, stepping.as_ref(), predictor);
+        let fits = Fits { sweep, finer, parameters: self.parameters, settings: self.settings };
         Ok(Fleet { fits: fits.checked()?, model: PhantomData })
     }
 }
@@ -131,46 +117,36 @@ impl<'a> Fits<'a> {
     }
 
     fn problem(&self, record: Record) -> Result<Problem<'a>, Error> {
-        let Sweeps { first, finer } = if is_even(&record) { &self.even } else { &self.uneven };
-        let problem = Problem::new(first.clone(), vec![record], &self.parameters, self.settings.clone())?;
-        Ok(problem.refining(finer.clone()))
+        let problem = Problem::new(self.sweep.clone(), vec![record], &self.parameters, self.settings.clone())?;
+        Ok(problem.refining(self.finer.clone()))
     }
 
     fn group(&self, records: &[Record]) -> Vec<Result<Summary, Error>> {
-        let (mut even, mut uneven) = (vec![], vec![]);
-        // Of what is wrong the error, of what is fitted whether its samples are evenly spaced.
-        let sorted = |record: &Record| {
-            let (problem, is_even) = (self.problem(record.clone())?, is_even(record));
-            if is_even {
-                even.push(problem)
-            } else {
-                uneven.push(problem)
+        let problems: Vec<_> = records.iter().map(|record| self.problem(record.clone())).collect();
+        let mut answers: Vec<Option<Result<Summary, Error>>> = Vec::with_capacity(problems.len());
+        let mut valid = vec![];
+        for problem in problems {
+            match problem {
+                Ok(problem) => {
+                    valid.push(problem);
+                    answers.push(None);
+                }
+                Err(error) => answers.push(Some(Err(error))),
             }
-            Ok(is_even)
-        };
-        let sorted: Vec<Result<bool, Error>> = records.iter().map(sorted).collect();
-        let [mut even, mut uneven] = [even, uneven].map(|problems| self.fitted(&problems).into_iter());
-        let answer = |sorted: Result<bool, Error>| match sorted {
-            Ok(true) => even.next(),
-            Ok(false) => uneven.next(),
-            Err(error) => Some(Err(error)),
-        };
-        sorted.into_iter().filter_map(answer).collect()
-    }
-
-    /// The answers of problems with one sweep: together, where such records run in more than one lane.
-    fn fitted(&self, problems: &[Problem<'_>]) -> Vec<Result<Summary, Error>> {
-        let Some(first) = problems.first() else { return vec![] };
-        let single = self.settings.prefilter.is_none() && self.settings.searches.count() == 1;
-        match single && first.sweep.lanes(&first.records[0], first.unknowns.seeds(0)) > 1 {
-            true => fit_together(problems),
-            false => problems.iter().map(Problem::run).collect(),
         }
+        let single = self.settings.prefilter.is_none() && self.settings.searches.count() == 1;
+        let mut found = match single && self.is_wide(&valid) {
+            true => fit_together(&valid),
+            false => valid.iter().map(Problem::run).collect(),
+        }
+        .into_iter();
+        answers.into_iter().filter_map(|answer| answer.or_else(|| found.next())).collect()
     }
-}
 
-fn is_even(record: &Record) -> bool {
-    matches!(record.times(), Time::Uniform { .. })
+    /// Whether such records run in more than one lane.
+    fn is_wide(&self, problems: &[Problem<'_>]) -> bool {
+        problems.first().is_some_and(|problem| self.sweep.lanes(&problem.records[0], problem.unknowns.seeds(0)) > 1)
+    }
 }
 
 /// Iterator of the answers of a fleet, in the order of its records.

@@ -1,12 +1,10 @@
 //! [`Plant`]: the interface of a predictor to the model between two samples.
 
-use super::Moments;
+use super::{Between, Moments};
 use crate::dual::Dual;
 use crate::functions::Functions;
 use crate::integrate::{Duals, Field, Method, Rate, Slopes, Stuck};
-use crate::interval::Hold;
 use crate::layout::{Kind, Layout};
-use crate::record::{Part, Record};
 use crate::scalar::Scalar;
 use crate::transition::{Crossing, Transition, squares};
 use core::cell::{Cell, RefCell};
@@ -89,73 +87,6 @@ pub trait Plant<S> {
     fn initial_noise(&self, to: &mut [S]);
 }
 
-/// From one sample of a record to the next.
-pub(crate) struct Between<S> {
-    /// Begin and length (s).
-    interval: (f64, f64),
-    u0: Vec<S>,
-    /// The input at the end; `None` where it is held.
-    u1: Option<Vec<S>>,
-    /// Where an input is late: between its jumps.
-    parts: Vec<Part<S>>,
-    /// The part that is being crossed.
-    part: Cell<Option<usize>>,
-}
-
-impl<S: Scalar> Between<S> {
-    /// From sample `k` on, with the dead times of inputs, if any has one; after the last sample the input is held and no time passes.
-    pub fn new(record: &Record, k: usize, delays: &[Option<S>]) -> Self {
-        let t0 = record.time(k);
-        let last = k + 1 >= record.len();
-        let length = if last { 0.0 } else { record.time(k + 1) - t0 };
-        let (interval, part) = ((t0, length), Cell::new(None));
-        if !delays.is_empty() {
-            let (u0, parts) = (record.late_inputs(k, delays), record.parts(k, delays));
-            return Between { interval, u0, u1: None, parts, part };
-        }
-        let u0 = record.input(k);
-        let at_end = |(i, u0): (usize, &f64)| match record.input_hold(i) {
-            Hold::Zero => S::from(*u0),
-            Hold::First => S::from(record.inputs()[i].values[k + 1]),
-        };
-        let moves = !record.holds.all_zero() && !last;
-        let u1 = moves.then(|| u0.iter().enumerate().map(at_end).collect());
-        Between { interval, u0: u0.into_iter().map(S::from).collect(), u1, parts: vec![], part }
-    }
-
-    /// How long it is (s).
-    pub fn length(&self) -> f64 {
-        self.interval.1
-    }
-
-    /// Whether the next sample is at another instant.
-    fn passes(&self) -> bool {
-        self.length() > 0.0
-    }
-
-    fn crossed(&self) -> Option<&Part<S>> {
-        self.part.get().and_then(|i| self.parts.get(i))
-    }
-
-    /// Time at a fraction of the interval, or of the part that is being crossed (s).
-    pub fn time(&self, position: f64) -> S {
-        match self.crossed() {
-            Some(part) => part.length * position + part.t0,
-            None => S::from(self.interval.0 + position * self.interval.1),
-        }
-    }
-
-    /// The input there.
-    pub fn input(&self, position: f64) -> Vec<S> {
-        let (u0, u1) = match self.crossed() {
-            Some(part) => (&part.u0, Some(&part.u1)),
-            None => (&self.u0, self.u1.as_ref()),
-        };
-        let Some(u1) = u1 else { return u0.clone() };
-        u0.iter().zip(u1).map(|(u0, u1)| (*u1 - *u0) * position + *u0).collect()
-    }
-}
-
 /// A plant whose functions and integrator are trait objects.
 pub(crate) struct SlicePlant<'a, S> {
     pub layout: &'a Layout,
@@ -213,7 +144,7 @@ impl<S: Stepped> SlicePlant<'_, S> {
         if !self.method.is_exact() {
             return None;
         }
-        let (n, length) = (self.layout.states.len(), self.between.length());
+        let (n, length) = (self.layout.states.len(), self.between.crossed);
         if let Some((_, known)) = self.intervals.crossings.borrow().iter().find(|(known, _)| *known == length) {
             return Some(known.clone());
         }

@@ -2,7 +2,7 @@
 //! have no types.
 
 use super::rest::Rest;
-use super::{NoStart, Piece, Reached, RunError, Seed, Visit, Window};
+use super::{NoStart, Piece, Prepared, Reached, RunError, Seed, Visit, Window};
 use crate::dual::Dual;
 use crate::functions::{Functions, delays};
 use crate::integrate::{Duals, Method, Stuck};
@@ -165,6 +165,20 @@ impl Filter<'_> {
         SlicePlant { layout: self.layout, functions, duals: self.duals, method: self.method, between, p, intervals }
     }
 
+    /// From a sample to the next.
+    pub(super) fn between<S: Scalar>(
+        &self,
+        (record, prepared): (&Record, &Prepared),
+        sample: usize,
+        delays: &[Option<S>],
+    ) -> Between<S> {
+        let between = Between::new(record, sample, delays);
+        match self.method.is_exact() {
+            true => between.crossed_as(prepared.lengths(record).after(sample)),
+            false => between,
+        }
+    }
+
     fn run_windows<S: Number>(
         &self,
         task: &Task<'_, S>,
@@ -230,7 +244,8 @@ impl Filter<'_> {
             None => true,
             Some(restart) => self.restart(task, pass, sample, restart).map_err(|Stuck| RunError::Failed { sample })?,
         };
-        let plant = self.plant(functions, Between::new(piece.record, sample, &pass.delays), &pass.p, &pass.intervals);
+        let between = self.between((piece.record, piece.prepared), sample, &pass.delays);
+        let plant = self.plant(functions, between, &pass.p, &pass.intervals);
         let columns = window.columns();
         for (j, channel) in piece.record.outputs().iter().enumerate() {
             let y = if is_known { channel.values[sample] } else { f64::NAN };
@@ -281,8 +296,8 @@ impl Filter<'_> {
         }
         pass.intervals.step.set(0.0);
         for from in first..sample {
-            let plant =
-                self.plant(task.functions, Between::new(piece.record, from, &pass.delays), &pass.p, &pass.intervals);
+            let between = self.between((piece.record, piece.prepared), from, &pass.delays);
+            let plant = self.plant(task.functions, between, &pass.p, &pass.intervals);
             task.steps.advance(&plant, &mut pass.carry)?;
         }
         Ok(true)

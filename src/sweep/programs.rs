@@ -1,10 +1,12 @@
 //! [`ProgramSweep`]: traced models, run as compiled programs, pieces in parallel lanes.
 
+mod band;
 mod columns;
 mod crossed;
 mod derived;
 mod horizon;
 mod interleaved;
+mod key;
 mod late;
 mod run;
 mod workspace;
@@ -24,6 +26,7 @@ use crate::recurrence::Recurrence;
 use crossed::Crossed;
 pub(crate) use derived::Derived;
 pub(crate) use interleaved::Interleaved;
+use key::{Key, Purpose};
 use late::Late;
 use run::Run;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
@@ -48,6 +51,8 @@ struct Programs {
     recurrences: Mutex<Vec<(Holds, Arc<Recurrence>)>>,
     /// Those that were asked for, with the reason where there can be none.
     compiled: Mutex<Vec<(Key, MaybeCompiled)>>,
+    /// The transition that all programs read, of linear equations that are crossed exactly.
+    crossed: Option<Arc<Crossed>>,
     /// This sweep with a finer step, if there is one.
     refined: OnceLock<Option<Arc<Programs>>>,
     /// Filters with given levels of noise, if there can be any.
@@ -61,30 +66,9 @@ type MaybeCompiled = Result<Arc<Compiled>, String>;
 
 /// Why a record has no program.
 const UNEVEN: &str = "inputs have dead times and samples are not evenly spaced";
-const UNEVENLY_CROSSED: &str = "intervals are crossed exactly and samples are not evenly spaced";
 
 /// Number of samples that take as long in dual numbers as a program takes to be compiled.
 const WORTH_COMPILING: usize = 4_000;
-
-/// Properties that a program depends on besides the recurrence.
-#[derive(Clone, Debug, PartialEq)]
-struct Key {
-    holds: Holds,
-    sampling: Sampling,
-    seeds: Vec<Seed>,
-    purpose: Purpose,
-    /// Whether records begin at rest.
-    at_rest: bool,
-}
-
-/// The functions that a program computes.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Purpose {
-    /// Rows of many trajectories.
-    Rows,
-    /// The carry of one, without rows.
-    Carry,
-}
 
 impl<'a> ProgramSweep<'a> {
     /// Compiles the equations, to values and to slopes with respect to all parameters.
@@ -127,10 +111,19 @@ impl Programs {
             None if predictor.is_simulation() && equations.is_affine() => Coupling::Affine,
             None => Coupling::Nonlinear,
         };
-        let (recurrences, compiled, refined) = (Mutex::new(vec![]), Mutex::new(vec![]), OnceLock::new());
-        let (filtering, lacking) = (OnceLock::new(), OnceLock::new());
-        let programs =
-            Programs { equations, method, predictor, coupling, recurrences, compiled, refined, filtering, lacking };
+        let linear = method.is_exact().then(|| equations.linear()).flatten();
+        let programs = Programs {
+            equations,
+            method,
+            predictor,
+            coupling,
+            recurrences: Mutex::default(),
+            compiled: Mutex::default(),
+            crossed: linear.map(|linear| Arc::new(Crossed::new(linear))),
+            refined: OnceLock::new(),
+            filtering: OnceLock::new(),
+            lacking: OnceLock::new(),
+        };
         programs.recurrence(&Holds::All(Hold::Zero))?;
         Ok(programs)
     }
@@ -157,8 +150,9 @@ impl Programs {
     /// The program for records like this one; `None` where there can be none.
     fn program(&self, record: &Record, seeds: &[Seed], purpose: Purpose) -> Option<Arc<Compiled>> {
         let sampling = match record.times() {
-            Time::Uniform { .. } => Sampling::Uniform,
-            Time::Stamps(_) => Sampling::Irregular,
+            // A run stops where the length of an interval changes that is crossed exactly.
+            Time::Stamps(_) if self.crossed.is_none() => Sampling::Irregular,
+            _ => Sampling::Uniform,
         };
         let at_rest = *record.initial_state() == Initial::Steady;
         let key = Key { holds: record.holds.clone(), sampling, seeds: seeds.to_vec(), purpose, at_rest };
@@ -172,19 +166,15 @@ impl Programs {
             false => recurrence,
         };
         let is_late = self.equations.late().contains(&true);
-        let linear = self.method.is_exact().then(|| self.equations.linear()).flatten();
         let program = match purpose {
             // How often a dead time cuts an interval differs from one to the next.
             _ if is_late && sampling == Sampling::Irregular => Err(UNEVEN.to_owned()),
-            // What follows from the parameters is computed for one interval.
-            _ if linear.is_some() && sampling == Sampling::Irregular => Err(UNEVENLY_CROSSED.to_owned()),
             Purpose::Rows => Ok(Program::compile(&recurrence, seeds, sampling, Trajectories::Many)),
             Purpose::Carry => Ok(Program::compile(&recurrence.without_outputs(), &[], sampling, Trajectories::One)),
         };
         let program = program.and_then(|program| program.map_err(|too_large| too_large.to_string()));
         let late = is_late.then(|| Late::new(self.equations.clone()));
-        let crossed = linear.map(Crossed::new);
-        let program = program.map(|program| Arc::new(Compiled::new(program, late, crossed)));
+        let program = program.map(|program| Arc::new(Compiled::new(program, late, self.crossed.clone())));
         compiled.push((key, program.clone()));
         program.ok()
     }

@@ -1,12 +1,13 @@
 //! [`States`]: the states of a record by a Kalman filter, and smoothed by all measurements.
 
+use super::Prepared;
 use super::filtered::{Filter, SLOPES};
 use crate::dual::Dual;
 use crate::functions::delays;
 use crate::integrate::{Duals, Stuck};
 use crate::layout::Layout;
 use crate::moments::entry;
-use crate::predict::{Between, Intervals, Plant};
+use crate::predict::{Intervals, Plant};
 use crate::record::Record;
 
 /// The states of a record with their covariance, by the parameters and the initial state of an estimate, whose own uncertainty is not in it.
@@ -62,10 +63,11 @@ impl Filter<'_> {
             (self.predictor.values(), delays(self.values, &self.late, p), Intervals::default());
         let constant: Vec<Duals> = p.iter().map(|p| Dual::constant(*p)).collect();
         let of_slopes: Vec<Intervals<Duals>> = (0..n.div_ceil(SLOPES)).map(|_| Intervals::default()).collect();
-        let mut carry = carry.to_vec();
+        let (prepared, mut carry) = (Prepared::default(), carry.to_vec());
+        let from = (record, &prepared);
         let mut visited = Vec::with_capacity(record.len());
         for k in 0..record.len() {
-            let plant = self.plant(self.values, Between::new(record, k, &late), p, &intervals);
+            let plant = self.plant(self.values, self.between(from, k, &late), p, &intervals);
             let mut updates = vec![];
             for (j, channel) in record.outputs().iter().enumerate().filter(|(_, channel)| !channel.values[k].is_nan()) {
                 let (mean, variance) = steps.predict(&plant, &carry, j);
@@ -83,7 +85,7 @@ impl Filter<'_> {
             }
             let (after, last) = (carry.clone(), k + 1 == record.len());
             let slopes = match smoothed && !last {
-                true => self.slopes(record, k, &carry, &constant, &of_slopes).map_err(|Stuck| k + 1)?,
+                true => self.slopes(from, k, &carry, &constant, &of_slopes).map_err(|Stuck| k + 1)?,
                 false => vec![],
             };
             visited.push(Visited { updates, carry: after, slopes });
@@ -97,7 +99,7 @@ impl Filter<'_> {
     /// The slopes of the state at the next sample with respect to the state at this one.
     fn slopes(
         &self,
-        record: &Record,
+        from: (&Record, &Prepared),
         k: usize,
         carry: &[f64],
         p: &[Duals],
@@ -112,7 +114,7 @@ impl Filter<'_> {
                 false => Dual::constant(*x),
             };
             let mut next: Vec<Duals> = carry.iter().enumerate().map(seeded).collect();
-            let plant = self.plant(self.duals, Between::new(record, k, &late), p, intervals);
+            let plant = self.plant(self.duals, self.between(from, k, &late), p, intervals);
             self.predictor.duals().advance(&plant, &mut next)?;
             for (i, x) in next[..n].iter().enumerate() {
                 slopes[i * n..][..n].iter_mut().skip(first).zip(x.slopes).for_each(|(to, slope)| *to = slope);

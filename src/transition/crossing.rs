@@ -60,3 +60,26 @@ impl<S: Scalar> Crossing<S> {
         }
     }
 }
+
+impl Crossing<f64> {
+    /// Whether the end is the other's to this part of the terms that it is a sum of, whatever the units of the states; not where a number is none.
+    pub fn is_near(&self, other: &Self, part: f64) -> bool {
+        let n = self.n;
+        let number = |of: &[Option<f64>], i: usize, j: usize| of[i * n + j].unwrap_or(0.0);
+        let identity = |i: usize, j: usize| f64::from(u8::from(i == j));
+        let added = |i: usize, j: usize| (number(&other.kept, i, j) - identity(i, j)).abs();
+        let terms = |i: usize, j: usize| {
+            let twice = (0..n).map(|k| added(i, k) * added(k, j)).sum::<f64>();
+            identity(i, j) + added(i, j) + twice
+        };
+        let variance = |i: usize| number(&other.covariance, i, i);
+        let is_close = |of: fn(&Self) -> &[Option<f64>], size: f64, i: usize, j: usize| {
+            (number(of(self), i, j) - number(of(other), i, j)).abs() <= part * size
+        };
+        (0..n * n).all(|at| {
+            let (i, j) = (at / n, at % n);
+            let covariance = (variance(i) * variance(j)).sqrt();
+            is_close(|of| &of.kept, terms(i, j), i, j) && is_close(|of| &of.covariance, covariance, i, j)
+        })
+    }
+}

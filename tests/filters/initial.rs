@@ -40,7 +40,7 @@ fn solved(mut rows: [[D; 4]; 3]) -> Matrix<D> {
 }
 
 /// Likelihood and gradient of a fit at a point against those of the exact filter from a covariance, to this part of the largest.
-fn agrees<const DISCRETE: bool>(
+pub fn agrees<const DISCRETE: bool>(
     fit: Fit<'_, Heated<DISCRETE>>,
     record: &ExperimentOf<Heated<DISCRETE>>,
     exact: impl Fn(&Plant<D>) -> Matrix<D>,

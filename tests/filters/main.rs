@@ -8,6 +8,7 @@ mod extended;
 mod given_noise;
 #[path = "../common/hardening.rs"]
 mod hardening;
+mod house;
 mod initial;
 mod jumps;
 mod missing_terms;
@@ -18,4 +19,5 @@ mod simulated;
 mod simulates;
 mod smoothed;
 mod two_sensors;
+mod uneven;
 mod walls;

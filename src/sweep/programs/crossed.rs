@@ -1,29 +1,40 @@
 //! [`Crossed`]: the transition of linear equations in the lanes of a program.
+//!
+//! A program reads the entries of a transition as numbers that follow the parameters, the same at every sample. Where the length of the interval
+//! changes, the run stops and those lanes get the numbers of the new length. Where a clock jitters, each interval has a length of its own; then the numbers are
+//! computed at some lengths, and are a polynomial between them ([`Band`]).
 
+use super::band::{Band, NODES};
+use crate::engine::Group;
 use crate::equations::Linear;
-use crate::record::Time;
+use crate::record::Lengths;
 use crate::sweep::Piece;
+use rustc_hash::FxHashMap;
+use std::ops::Range;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+/// Lengths of a record in one band from which on a polynomial is worth it.
+const MANY: usize = 2 * NODES;
+/// How far the polynomial may be off where it is worst, beside the begin of its band; it is near rounding but for plants that swing around more than once
+/// from sample to sample.
+const NEAR: f64 = 1e-11;
+/// Most numbers that are kept of a set of parameters; those of further lengths are computed whenever they are needed.
+const KEPT: usize = 1_000_000;
 
 /// Linear equations, and the numbers that were computed last: the pieces of a record share them.
 pub(super) struct Crossed {
     linear: Linear,
-    last: Mutex<Known>,
+    last: Mutex<Arc<Known>>,
 }
 
-/// Parameters, the length of an interval (s), and the numbers that follow.
+/// The numbers of a set of parameters.
 #[derive(Default)]
 struct Known {
     parameters: Vec<f64>,
-    step: f64,
-    numbers: Arc<Vec<f64>>,
-}
-
-impl Known {
-    /// The numbers, if they are those of these parameters and this interval.
-    fn numbers_of(&self, parameters: &[f64], step: f64) -> Option<Arc<Vec<f64>>> {
-        (self.step == step && self.parameters == parameters).then(|| self.numbers.clone())
-    }
+    /// By the bits of the length of an interval (s), and whether they are those of a polynomial.
+    numbers: Mutex<FxHashMap<(u64, bool), Arc<Vec<f64>>>>,
+    /// By their number; none where a polynomial is no good.
+    bands: Mutex<FxHashMap<i32, Option<Arc<Band>>>>,
 }
 
 impl Crossed {
@@ -31,19 +42,116 @@ impl Crossed {
         Crossed { linear, last: Mutex::default() }
     }
 
-    /// The parameters of a piece as its program has them: after them what follows from them and the time between two samples.
-    pub fn parameters(&self, piece: &Piece<'_>) -> Arc<Vec<f64>> {
-        let step = if let Time::Uniform { step, .. } = piece.record.times() { *step } else { f64::NAN };
-        let known = self.last().numbers_of(piece.parameters, step);
-        known.unwrap_or_else(|| {
-            // Without the lock: other threads compute for other parameters.
-            let numbers = Arc::new(self.linear.numbers(piece.parameters, step));
-            *self.last() = Known { parameters: piece.parameters.to_vec(), step, numbers: numbers.clone() };
-            numbers
-        })
+    fn known(&self, parameters: &[f64]) -> Arc<Known> {
+        let mut last = lock(&self.last);
+        if last.parameters != parameters {
+            *last = Arc::new(Known { parameters: parameters.to_vec(), ..Known::default() });
+        }
+        last.clone()
     }
 
-    fn last(&self) -> MutexGuard<'_, Known> {
-        self.last.lock().unwrap_or_else(PoisonError::into_inner)
+    /// The parameters as a program has them: after them what follows from them and the length of an interval, one of these.
+    fn numbers(&self, known: &Known, lengths: &Lengths, length: f64) -> Arc<Vec<f64>> {
+        let band = Band::of(length);
+        let many = length > 0.0 && lengths.between(Band::bounds(band)) >= MANY;
+        let key = (length.to_bits(), many);
+        if let Some(numbers) = lock(&known.numbers).get(&key) {
+            return numbers.clone();
+        }
+        // Without the lock: other threads compute those of other lengths.
+        let numbers = match many.then(|| self.band(known, band)).flatten() {
+            Some(band) => {
+                let mut numbers = band.numbers(length);
+                numbers.iter_mut().zip(&known.parameters).for_each(|(number, parameter)| *number = *parameter);
+                numbers
+            }
+            None => self.linear.numbers(&known.parameters, length),
+        };
+        let numbers = Arc::new(numbers);
+        let mut kept = lock(&known.numbers);
+        if kept.len() * numbers.len() < KEPT {
+            kept.insert(key, numbers.clone());
+        }
+        numbers
     }
+
+    fn band(&self, known: &Known, number: i32) -> Option<Arc<Band>> {
+        if let Some(band) = lock(&known.bands).get(&number) {
+            return band.clone();
+        }
+        let numbers = |length: f64| self.linear.numbers(&known.parameters, length);
+        let crossing = |numbers: Vec<f64>| self.linear.crossing(|following| numbers[following.number as usize]);
+        let (band, [begin, _]) = (Band::new(number, numbers), Band::bounds(number));
+        let exact = numbers(begin);
+        // What overflows at the begin does so in the whole band.
+        let is_near = exact.iter().any(|number| !number.is_finite())
+            || crossing(band.numbers(begin)).is_near(&crossing(exact), NEAR);
+        let band = is_near.then(|| Arc::new(band));
+        lock(&known.bands).insert(number, band.clone());
+        band
+    }
+}
+
+fn lock<T>(of: &Mutex<T>) -> MutexGuard<'_, T> {
+    of.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// The lanes of a run, each with the numbers of the interval that it is in.
+pub(super) struct Crossing<'r> {
+    crossed: &'r Crossed,
+    lanes: Vec<Lane<'r>>,
+}
+
+struct Lane<'r> {
+    known: Arc<Known>,
+    lengths: &'r Lengths,
+    /// Whose numbers the group has.
+    length: Option<f64>,
+}
+
+impl<'r> Crossing<'r> {
+    pub fn new(crossed: &'r Crossed, pieces: &[&Piece<'r>]) -> Self {
+        let lane = |piece: &&Piece<'r>| {
+            let (known, lengths) = (crossed.known(piece.parameters), piece.prepared.lengths(piece.record));
+            Lane { known, lengths, length: None }
+        };
+        Crossing { crossed, lanes: pieces.iter().map(lane).collect() }
+    }
+
+    /// Prepares the group for the intervals after the samples that are so many after the first of each lane's piece.
+    pub fn enter(&mut self, group: &mut Group, pieces: &[Piece<'_>], after: usize) {
+        let mut changed = false;
+        for (number, lane) in self.lanes.iter_mut().enumerate() {
+            let length = lane.lengths.after(samples(pieces, number, after..after).start);
+            if lane.length != Some(length) {
+                group.set_parameters(number, &self.crossed.numbers(&lane.known, lane.lengths, length));
+                group.set_step(number, length);
+                (lane.length, changed) = (Some(length), true);
+            }
+        }
+        if changed {
+            group.prepare();
+        }
+    }
+
+    /// How many samples after the first of these, which are counted from the first of each lane's piece, the length of the interval changes in a
+    /// lane.
+    pub fn changes(&self, pieces: &[Piece<'_>], counted: Range<usize>) -> Vec<usize> {
+        let mut found = vec![];
+        for (number, Lane { lengths, .. }) in self.lanes.iter().enumerate().filter(|(_, lane)| lane.lengths.count() > 1)
+        {
+            let here = samples(pieces, number, counted.clone());
+            let first = here.start;
+            let changed = here.skip(1).filter(|k| lengths.after(*k) != lengths.after(k - 1));
+            found.extend(changed.map(|k| k - first));
+        }
+        found
+    }
+}
+
+/// The samples of a lane, without those after the end of its piece; lanes without a piece repeat the first.
+fn samples(pieces: &[Piece<'_>], lane: usize, counted: Range<usize>) -> Range<usize> {
+    let Range { start, end } = pieces.get(lane).unwrap_or(&pieces[0]).samples.clone();
+    let at = |counted: usize| (start + counted).min(end);
+    at(counted.start).min(end.max(start + 1) - 1)..at(counted.end)
 }

@@ -1,6 +1,7 @@
 //! Runs pieces in the lanes of a program.
 
 use super::columns::Columns;
+use super::crossed::Crossing;
 use super::interleaved::Kept;
 use super::workspace::{Compiled, WINDOW, Workspace};
 use crate::record::Time;
@@ -16,6 +17,8 @@ pub(super) struct Run<'r> {
     columns: Option<Columns<'r>>,
     /// The kept columns, from the first sample of each piece on.
     kept: Option<Arc<Kept>>,
+    /// Where linear equations are crossed exactly.
+    crossing: Option<Crossing<'r>>,
     space: Workspace,
 }
 
@@ -24,19 +27,19 @@ impl<'r> Run<'r> {
         let mut space = compiled.workspace(pieces.len());
         let (group, lanes) = (&mut space.group, space.begins.len());
         // Lanes without a piece repeat the first.
-        let piece = |lane: usize| pieces.get(lane).unwrap_or(&pieces[0]);
-        for lane in 0..lanes {
-            match (&compiled.late, &compiled.crossed) {
-                (Some(late), _) => group.set_parameters(lane, &late.parameters(piece(lane))),
-                (_, Some(crossed)) => group.set_parameters(lane, &crossed.parameters(piece(lane))),
-                _ => group.set_parameters(lane, piece(lane).parameters),
+        let all: Vec<&Piece<'r>> = (0..lanes).map(|lane| pieces.get(lane).unwrap_or(&pieces[0])).collect();
+        let crossing = compiled.crossed.as_ref().map(|crossed| Crossing::new(crossed, &all));
+        for (lane, piece) in all.iter().enumerate().filter(|_| crossing.is_none()) {
+            match &compiled.late {
+                Some(late) => group.set_parameters(lane, &late.parameters(piece)),
+                None => group.set_parameters(lane, piece.parameters),
             }
-            if let Time::Uniform { step, .. } = piece(lane).record.times() {
+            if let Time::Uniform { step, .. } = piece.record.times() {
                 group.set_step(lane, *step);
             }
         }
         group.prepare();
-        let mut run = Run { compiled, pieces, columns: None, kept: None, space };
+        let mut run = Run { compiled, pieces, columns: None, kept: None, crossing, space };
         run.start();
         run
     }
@@ -84,14 +87,18 @@ impl<'r> Run<'r> {
     fn predict(&mut self, first: usize, begin: usize, end: usize) {
         let Workspace { group, inputs, rows, window, .. } = &mut self.space;
         let program = &self.compiled.program;
-        if begin == 0 {
-            group.clear_negligible();
+        if let Some(crossing) = &mut self.crossing {
+            crossing.enter(group, &self.pieces, first + begin);
         }
         let (inputs, read): (&[f64], usize) =
             self.kept.as_ref().map_or((inputs, begin), |kept| (&kept.inputs, first + begin));
         let rows = if window.has_variances() { rows } else { window.all_rows_mut() };
         let (inputs_at, rows_at) = (program.columns().len() * group.lanes(), program.row_length() * group.lanes());
-        group.go_on(&inputs[read * inputs_at..], &mut rows[begin * rows_at..], end - begin);
+        let (inputs, rows) = (&inputs[read * inputs_at..], &mut rows[begin * rows_at..]);
+        match begin {
+            0 => group.run(inputs, rows, end - begin),
+            _ => group.go_on(inputs, rows, end - begin),
+        }
     }
 
     /// Reads the inputs of a window that begins `begin` samples after the first of each piece.
@@ -130,10 +137,13 @@ impl<'r> Run<'r> {
         let mut found = Vec::with_capacity(at.len());
         for &next in at {
             while sample < next {
-                let samples = WINDOW.min(next - sample);
-                self.read(sample - self.pieces[0].samples.start, samples);
-                let Workspace { group, inputs, .. } = &mut self.space;
-                group.run(inputs, &mut [], samples);
+                let (begin, samples) = (sample - self.pieces[0].samples.start, WINDOW.min(next - sample));
+                self.read(begin, samples);
+                let mut done = 0;
+                for end in self.parts(begin, samples) {
+                    self.predict(begin, done, end);
+                    done = end;
+                }
                 sample += samples;
             }
             let mut carry = vec![0.0; self.compiled.program.carried()];
@@ -156,22 +166,25 @@ impl<'r> Run<'r> {
         reached
     }
 
-    /// The numbers of samples of this window after which pieces end, in ascending order, that are continued by another.
-    fn ends(&self, samples: usize) -> Vec<usize> {
+    /// Where the parts of a window end, `begin` samples after the first of each piece: where a piece ends that is continued by another, and where
+    /// the length of an interval changes that is crossed exactly.
+    fn parts(&self, begin: usize, samples: usize) -> Vec<usize> {
         let continued = |(piece, here): &(&Piece<'_>, &usize)| {
             (1..samples).contains(*here) && piece.samples.end < piece.record.len()
         };
-        let ends = self.pieces.iter().zip(&self.space.window.samples).filter(continued);
-        let mut ends: Vec<usize> = ends.map(|(_, here)| *here).collect();
-        ends.sort_unstable();
-        ends.dedup();
-        ends
+        let ends = self.pieces.iter().zip(&self.space.window.samples).filter(continued).map(|(_, here)| *here);
+        let changes = |crossing: &Crossing<'_>| crossing.changes(&self.pieces, begin..begin + samples);
+        let changes = self.crossing.as_ref().map_or(vec![], changes);
+        let mut parts: Vec<usize> = ends.chain(changes).chain([samples]).collect();
+        parts.sort_unstable();
+        parts.dedup();
+        parts
     }
 
     /// Runs a window, `begin` samples after the first of each piece, and turns predicted outputs into prediction errors.
     fn fill(&mut self, begin: usize, samples: usize, reached: &mut [Reached]) {
         let mut done = 0;
-        for end in self.ends(samples).into_iter().chain([samples]) {
+        for end in self.parts(begin, samples) {
             self.predict(begin, done, end);
             for (lane, reached) in reached.iter_mut().enumerate() {
                 if begin + end == self.pieces[lane].samples.len() {

@@ -18,7 +18,7 @@ pub(super) struct Compiled {
     /// Where inputs have dead times.
     pub late: Option<Late>,
     /// Where linear equations are crossed exactly.
-    pub crossed: Option<Crossed>,
+    pub crossed: Option<Arc<Crossed>>,
     idle: Mutex<Vec<Workspace>>,
     pub columns: Arc<Idle>,
 }
@@ -38,7 +38,7 @@ pub(super) struct Workspace {
 }
 
 impl Compiled {
-    pub fn new(program: Program, late: Option<Late>, crossed: Option<Crossed>) -> Self {
+    pub fn new(program: Program, late: Option<Late>, crossed: Option<Arc<Crossed>>) -> Self {
         Compiled { program, late, crossed, idle: Mutex::new(vec![]), columns: Arc::default() }
     }
 
