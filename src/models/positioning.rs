@@ -175,11 +175,11 @@ impl Model for PositioningLoop {
         ControlledAxisMotion { moved: S::from(0.0), before: x.moved, held: self.command(x, u), ..*x }
     }
 
-    /// Before the record the axis did not move.
+    /// What the controller kept has no part in what follows, but for how far the axis has moved.
     #[inline]
     fn initial<S: Scalar>(&self, _u: &Reference<S>, _p: &AxisParameters<S>) -> ControlledAxisMotion<S> {
         let (still, unsaid) = (S::from(0.0), S::from(f64::NAN));
-        ControlledAxisMotion { q: unsaid, v: still, moved: still, before: still, held: still }
+        ControlledAxisMotion { q: unsaid, v: unsaid, moved: unsaid, before: still, held: still }
     }
 
     #[inline]

@@ -118,8 +118,8 @@ impl Model for LinearAxisUnderItsController {
     fn initial<S: Scalar>(&self, _u: &Of<Self::Input, S>, _p: &Of<Self::Parameters, S>) -> Of<Self::State, S> {
         LinearAxisUnderItsControllerState {
             q: S::from(f64::NAN),
-            v: S::from(0.0),
-            moved: S::from(0.0),
+            v: S::from(f64::NAN),
+            moved: S::from(f64::NAN),
             before: S::from(0.0),
             held: S::from(0.0),
         }
