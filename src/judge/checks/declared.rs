@@ -132,7 +132,7 @@ fn guessed_starts(evidence: &Evidence<'_>) -> Option<Warning> {
         "the outputs do not give {}{more}: estimated, from a start of {}; if it is known, or nearly, say so \
          (Experiment::initial)",
         names.join(", "),
-        exact(first.parameter.start)
+        number(first.parameter.start, 6)
     );
     Some(note(WarningCode::GuessedStart, text))
 }
