@@ -51,10 +51,9 @@ impl Group {
 
     /// A lane's parameters; those that nothing depends on may be left out at the end.
     pub fn set_parameters(&mut self, lane: usize, values: &[f64]) {
-        let (carried, parameters) = (self.program.code.carried, self.program.parameters);
-        for (j, value) in values[..].iter().take(parameters).enumerate() {
-            self.slot(carried + j)[lane] = *value;
-        }
+        let (carried, parameters, lanes) = (self.program.code.carried, self.program.parameters, self.lanes());
+        let slots = self.numbers.chunks_exact_mut(lanes).skip(carried);
+        slots.zip(values).take(parameters).for_each(|(slot, value)| slot[lane] = *value);
     }
 
     /// The time (s) from sample to sample of a lane, if it is the same for all samples.

@@ -89,6 +89,8 @@ mod tests {
     /// Gaps, jitter of a millionth, and measurements at one instant are lengths of their own.
     #[test]
     fn lengths_that_differ_by_more() {
+        // A clock of today shows a microsecond as four or five of its steps; two measurements at one instant are no time apart.
+        assert_eq!(Lengths::of_stamps(&[0.0, 0.0, 5e-7, 5e-7].map(|t| 1.8e9 + t)).count(), 2);
         let found = Lengths::of_stamps(&[0.0, 900.0, 1800.0, 1800.0, 4500.0, 5400.0 + 1e-3, 5400.0 + 1e-3 + 900.0]);
         assert_eq!(found.count(), 4);
         let after: Vec<f64> = (0..8).map(|k| found.after(k)).collect();

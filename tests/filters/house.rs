@@ -7,11 +7,11 @@ signals! { pub struct Rooms { ti: "K", te: "K", th: "K", ts: "K" } }
 signals! { pub struct Weather { ta: "K", heat: "kW" } }
 signals! { pub struct Thermometer { y: "K" } }
 signals! {
-    pub struct Walls4 { sensor: "s", heater: "s", air: "s", envelope: "s", outside: "s", gain: "K/(kW s)", q: "K/s^0.5", r: "K" }
+    pub struct Thermal { sensor: "s", heater: "s", air: "s", envelope: "s", outside: "s", gain: "K/(kW s)", q: "K/s^0.5", r: "K" }
 }
 
-pub const TRUTH: Walls4 =
-    Walls4 { sensor: 60.0, heater: 700.0, air: 3600.0, envelope: 4e4, outside: 1e5, gain: 3e-3, q: 4e-3, r: 0.03 };
+pub const TRUTH: Thermal =
+    Thermal { sensor: 60.0, heater: 700.0, air: 3600.0, envelope: 4e4, outside: 1e5, gain: 3e-3, q: 4e-3, r: 0.03 };
 /// A quarter of an hour (s).
 pub const QUARTER: f64 = 900.0;
 
@@ -22,8 +22,8 @@ impl Model for House {
     type State = Rooms;
     type Input = Weather;
     type Output = Thermometer;
-    type Parameters = Walls4;
-    fn derivative<S: Scalar>(&self, _t: S, x: &Rooms<S>, u: &Weather<S>, p: &Walls4<S>) -> Rooms<S> {
+    type Parameters = Thermal;
+    fn derivative<S: Scalar>(&self, _t: S, x: &Rooms<S>, u: &Weather<S>, p: &Thermal<S>) -> Rooms<S> {
         Rooms {
             ti: (x.te - x.ti) / p.air + (x.th - x.ti) / p.heater,
             te: (x.ti - x.te) / p.envelope + (u.ta - x.te) / p.outside,
@@ -31,13 +31,13 @@ impl Model for House {
             ts: (x.ti - x.ts) / p.sensor,
         }
     }
-    fn output<S: Scalar>(&self, _t: S, x: &Rooms<S>, _u: &Weather<S>, _p: &Walls4<S>) -> Thermometer<S> {
+    fn output<S: Scalar>(&self, _t: S, x: &Rooms<S>, _u: &Weather<S>, _p: &Thermal<S>) -> Thermometer<S> {
         Thermometer { y: x.ts }
     }
-    fn diffusion<S: Scalar>(&self, _t: S, _x: &Rooms<S>, _u: &Weather<S>, p: &Walls4<S>) -> Rooms<S> {
+    fn diffusion<S: Scalar>(&self, _t: S, _x: &Rooms<S>, _u: &Weather<S>, p: &Thermal<S>) -> Rooms<S> {
         Rooms { ti: p.q, te: p.q * 0.3, th: S::from(0.0), ts: S::from(0.0) }
     }
-    fn noise<S: Scalar>(&self, _t: S, _x: &Rooms<S>, _u: &Weather<S>, p: &Walls4<S>) -> Thermometer<S> {
+    fn noise<S: Scalar>(&self, _t: S, _x: &Rooms<S>, _u: &Weather<S>, p: &Thermal<S>) -> Thermometer<S> {
         Thermometer { y: p.r }
     }
 }
@@ -50,7 +50,10 @@ pub fn record(stamps: Vec<f64>) -> ExperimentOf<House> {
     let (mut inputs, mut outputs) = (vec![], vec![]);
     for (k, stamp) in stamps.iter().enumerate() {
         let day = (stamp / 86_400.0 * core::f64::consts::TAU).sin();
-        let u = Weather { ta: 5.0 + 4.0 * day, heat: if (stamp / 14_400.0) as u64 % 3 == 0 { 4.0 } else { 0.5 } };
+        let u = Weather {
+            ta: 5.0 + 4.0 * day,
+            heat: if ((stamp / 14_400.0) as u64).is_multiple_of(3) { 4.0 } else { 0.5 },
+        };
         outputs.push(Thermometer { y: x[3] + p.r * noise.gauss() });
         let end = stamps.get(k + 1).copied().unwrap_or(*stamp);
         while t < end {
@@ -65,9 +68,9 @@ pub fn record(stamps: Vec<f64>) -> ExperimentOf<House> {
     Experiment::new(&House, Time::from_stamps(stamps), inputs, outputs).unwrap()
 }
 
-pub fn start() -> Walls4<Parameter> {
+pub fn start() -> Thermal<Parameter> {
     let near = |truth: f64, factor: f64| free(truth * factor).log();
-    Walls4 {
+    Thermal {
         sensor: fixed(60.0),
         heater: near(TRUTH.heater, 1.3),
         air: near(TRUTH.air, 0.8),

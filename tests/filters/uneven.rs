@@ -3,7 +3,7 @@
 use crate::common::Noise;
 use crate::crossed::EXACT;
 use crate::house;
-use crate::house::{House, QUARTER, TRUTH, Walls4};
+use crate::house::{House, QUARTER, TRUTH, Thermal};
 use crate::initial::agrees;
 use crate::walls::{Heated, record, start};
 use greybox::*;
@@ -36,7 +36,7 @@ fn likelihoods_by_exact_transitions() {
 /// Lengths that are half of the tolerance off one another move the likelihood by no larger part.
 #[test]
 fn lengths_that_are_nearly_one() {
-    let off = |k: usize| 0.1 * k as f64 + if k % 2 == 0 { 2.5e-11 } else { 0.0 };
+    let off = |k: usize| 0.1 * k as f64 + if k.is_multiple_of(2) { 2.5e-11 } else { 0.0 };
     let stamps = (0..1200).map(|k| off(k) + if k > 600 { 0.7 } else { 0.0 }).collect();
     let record = record::<false>(Time::Stamps(stamps), 1200);
     agrees(
@@ -64,9 +64,9 @@ fn a_stiff_house_needs_no_finer_steps() {
         let found = fitted(stamps);
         assert_eq!((found.method.integrator.as_str(), found.method.refinement), (EXACT, 0), "{found}");
         assert!(found.outcome.converged() && found.severity() < Severity::NotUsable, "{found}");
-        let truth = Walls4::into_array(TRUTH);
-        let knowledge = Walls4::into_array(found.knowledge);
-        for ((value, truth), knowledge) in Walls4::into_array(found.parameters).iter().zip(truth).zip(knowledge) {
+        let truth = Thermal::into_array(TRUTH);
+        let knowledge = Thermal::into_array(found.knowledge);
+        for ((value, truth), knowledge) in Thermal::into_array(found.parameters).iter().zip(truth).zip(knowledge) {
             let Some(error) = knowledge.standard_error() else { continue };
             // Of 21 values none is as far off by chance in one of a thousand records.
             assert!((value - truth).abs() < 4.0 * error, "{value} {truth} {error}: {found}");

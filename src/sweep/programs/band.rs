@@ -35,7 +35,7 @@ impl Band {
         let node = |i: usize| {
             let (sin, cos) = (PI * (i as f64 + 0.5) / NODES as f64).sin_cos();
             let length = 0.5 * (begin + end) + 0.5 * (end - begin) * cos;
-            Node { length, weight: if i % 2 == 0 { sin } else { -sin }, numbers: numbers(length) }
+            Node { length, weight: if i.is_multiple_of(2) { sin } else { -sin }, numbers: numbers(length) }
         };
         Band { nodes: (0..NODES).map(node).collect() }
     }

@@ -27,12 +27,15 @@ pub(super) struct Crossed {
     last: Mutex<Arc<Known>>,
 }
 
+/// Parameters, and what follows from them and the length of an interval.
+type Numbers = Arc<Vec<f64>>;
+
 /// The numbers of a set of parameters.
 #[derive(Default)]
 struct Known {
     parameters: Vec<f64>,
     /// By the bits of the length of an interval (s), and whether they are those of a polynomial.
-    numbers: Mutex<FxHashMap<(u64, bool), Arc<Vec<f64>>>>,
+    numbers: Mutex<FxHashMap<(u64, bool), Numbers>>,
     /// By their number; none where a polynomial is no good.
     bands: Mutex<FxHashMap<i32, Option<Arc<Band>>>>,
 }
@@ -51,7 +54,7 @@ impl Crossed {
     }
 
     /// The parameters as a program has them: after them what follows from them and the length of an interval, one of these.
-    fn numbers(&self, known: &Known, lengths: &Lengths, length: f64) -> Arc<Vec<f64>> {
+    fn numbers(&self, known: &Known, lengths: &Lengths, length: f64) -> Numbers {
         let band = Band::of(length);
         let many = length > 0.0 && lengths.between(Band::bounds(band)) >= MANY;
         let key = (length.to_bits(), many);

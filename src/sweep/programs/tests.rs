@@ -1,3 +1,4 @@
+mod crossed;
 mod late;
 
 use super::*;
