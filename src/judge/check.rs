@@ -19,6 +19,8 @@ pub(crate) struct Check {
     examine: Examine,
     /// What rules it out.
     pub unless: &'static [Unless],
+    /// Whether it asks about what is of use only where no check before it finds the estimate not usable.
+    pub of_usable: bool,
     /// The passes over the data that it may take.
     pub costs: &'static [Pass],
     /// The numbers by which it decides.
@@ -31,7 +33,11 @@ type Examine = fn(&Evidence<'_>, &Intervals) -> Examined;
 impl Check {
     /// One that is always made, without a pass of its own.
     pub const fn new(name: &'static str, asks: &'static str, codes: &'static [WarningCode], examine: Examine) -> Self {
-        Check { name, asks, codes, examine, unless: &[], costs: &[], levels: &[] }
+        Check { name, asks, codes, examine, unless: &[], of_usable: false, costs: &[], levels: &[] }
+    }
+
+    pub const fn of_usable(self) -> Self {
+        Check { of_usable: true, ..self }
     }
 
     pub const fn unless(self, unless: &'static [Unless]) -> Self {
@@ -93,7 +99,7 @@ pub(crate) struct Examined {
 
 impl Examined {
     /// Not made, for this reason.
-    fn skipped(because: &'static str) -> Self {
+    pub fn skipped(because: &'static str) -> Self {
         Examined { warnings: vec![], extent: Extent::Nothing { because: because.into() } }
     }
 

@@ -96,11 +96,18 @@ pub(crate) const CHECKS: &[Check] = &[
     search::TIME,
 ];
 
+/// Why a check of usable estimates is not made of another.
+const USELESS: &str = "an estimate that is not usable";
+
 /// The warnings of all checks, and how far each was made.
 pub(crate) fn examine(evidence: &Evidence<'_>, intervals: &Intervals) -> (Vec<Warning>, Vec<Examination>) {
     let (control, mut warnings, mut examined) = (evidence.point.objective.control, vec![], vec![]);
     for check in CHECKS {
-        let mut found = check.examine(evidence, intervals);
+        let is_useless = || warnings.iter().any(|warning: &Warning| warning.severity == Severity::NotUsable);
+        let mut found = match check.of_usable && is_useless() {
+            true => Examined::skipped(USELESS),
+            false => check.examine(evidence, intervals),
+        };
         debug_assert!(found.warnings.iter().all(|warning| check.codes.contains(&warning.code)), "{}", check.name);
         // Passes that are ended find nothing.
         if !check.costs.is_empty() && control.stops() {

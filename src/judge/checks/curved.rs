@@ -21,6 +21,7 @@ pub(crate) const CURVED: Check = Check::new(
     },
 )
 .unless(&[Unless::RoundOff, Unless::Variances])
+.of_usable()
 .costs(&[Pass::EachUnknown(1)])
 .levels(&[
     level("the expected curvature of an unknown that is examined", SMALL, "a standard error of 15 %"),

@@ -48,7 +48,7 @@ fn page() -> String {
         ),
     };
     page += " (`GREYBOX_WRITE_CHECKS=1 cargo test --release --test verdicts good` measures that).\n";
-    for (number, Check { name, asks, codes, unless, costs, levels, .. }) in CHECKS.iter().enumerate() {
+    for (number, Check { name, asks, codes, unless, of_usable, costs, levels, .. }) in CHECKS.iter().enumerate() {
         let named = |one: &WarningCode| match flagged["all"] {
             0 => format!("`{}`", code(one)),
             _ => format!("`{}` ({})", code(one), flagged.get(&format!("{one:?}")).unwrap_or(&0)),
@@ -57,7 +57,7 @@ fn page() -> String {
         let costs: Vec<String> = costs.iter().map(pass).collect();
         let costs = if costs.is_empty() { "none".to_owned() } else { costs.join("; ") };
         page += &format!("\n## {}. {name}\n\n{asks}\n\nCodes: {}. Passes: {costs}.", number + 1, codes.join(", "));
-        let unless: Vec<&str> = unless.iter().map(|one| one.reason()).collect();
+        let unless: Vec<&str> = unless.iter().map(|one| one.reason()).chain(of_usable.then_some(USELESS)).collect();
         page += &if unless.is_empty() { "\n".to_owned() } else { format!(" Skipped for: {}.\n", unless.join("; ")) };
         if !levels.is_empty() {
             page += "\n| level | value | where it comes from |\n|---|---|---|\n";
