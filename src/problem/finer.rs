@@ -85,6 +85,11 @@ impl<'a> Problem<'a> {
         Ok(Problem { sweep, prepared, cuts, method, ..self.clone() })
     }
 
+    /// Steps per sample of its method, if that is one of those that follow the default one; else one.
+    pub(crate) fn steps(&self) -> usize {
+        self.method.checked_sub(1).and_then(|number| SUBSTEPS.get(number)).map_or(1, |steps| *steps as usize)
+    }
+
     /// The problem by a finer method, numbered from the coarsest; `None` after the last.
     pub(crate) fn finer(&self, number: usize) -> Option<&Problem<'_>> {
         self.finer.as_ref()?.by(number)

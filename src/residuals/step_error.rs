@@ -111,8 +111,10 @@ pub(crate) fn step_errors(all: &[Compared<'_>]) -> Vec<f64> {
     let windows: Vec<(usize, &Sampled)> =
         all.iter().enumerate().flat_map(|(i, one)| one.windows.iter().map(move |window| (i, window))).collect();
     let mut sums = vec![Changes::default(); all.len()];
-    let samples = windows.iter().map(|(_, window)| window.range().len()).sum();
-    if let Some(finer) = all.first().and_then(|one| one.objective.sweep.refined(samples)) {
+    let samples: usize = windows.iter().map(|(_, window)| window.range().len()).sum();
+    // A program is worth its compilation by the steps that it takes.
+    let steps = all.first().map_or(0, |one| samples * one.objective.problem.steps());
+    if let Some(finer) = all.first().and_then(|one| one.objective.sweep.refined(steps)) {
         let batches = batches(&*finer, all, &windows);
         let one = |b: usize| changes(&*finer, all, batches[b]);
         let found: Vec<Vec<(f64, usize)>> = match samples >= WORTH_THREADS {
