@@ -60,7 +60,7 @@ const TRUTH: Loop = Loop { a: 0.6, b: 0.5, k: 0.4, c: 0.03, q: 0.1, s: 0.05 };
 const AT: Loop = Loop { a: 0.8, b: 0.45, k: 0.5, c: 0.05, q: 0.2, s: 0.08 };
 
 fn reference(k: usize) -> Reference {
-    Reference { r: if k / 25 % 2 == 0 { 1.0 } else { -0.5 }, dose: if k % 40 == 7 { 0.8 } else { 0.0 } }
+    Reference { r: if (k / 25).is_multiple_of(2) { 1.0 } else { -0.5 }, dose: if k % 40 == 7 { 0.8 } else { 0.0 } }
 }
 
 /// Of the plant from 0.3 V; every seventh output is missing.
