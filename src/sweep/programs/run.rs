@@ -140,7 +140,7 @@ impl<'r> Run<'r> {
                 let (begin, samples) = (sample - self.pieces[0].samples.start, WINDOW.min(next - sample));
                 self.read(begin, samples);
                 let mut done = 0;
-                for end in self.parts(begin, samples) {
+                for end in self.cuts(begin, samples).into_iter().chain([samples]) {
                     self.predict(begin, done, end);
                     done = end;
                 }
@@ -166,25 +166,25 @@ impl<'r> Run<'r> {
         reached
     }
 
-    /// Where the parts of a window end, `begin` samples after the first of each piece: where a piece ends that is continued by another, and where
-    /// the length of an interval changes that is crossed exactly.
-    fn parts(&self, begin: usize, samples: usize) -> Vec<usize> {
+    /// Where a window is cut, `begin` samples after the first of each piece, in ascending order: where a piece ends that is continued by another, and
+    /// where the length of an interval changes that is crossed exactly.
+    fn cuts(&self, begin: usize, samples: usize) -> Vec<usize> {
         let continued = |(piece, here): &(&Piece<'_>, &usize)| {
             (1..samples).contains(*here) && piece.samples.end < piece.record.len()
         };
         let ends = self.pieces.iter().zip(&self.space.window.samples).filter(continued).map(|(_, here)| *here);
         let changes = |crossing: &Crossing<'_>| crossing.changes(&self.pieces, begin..begin + samples);
         let changes = self.crossing.as_ref().map_or(vec![], changes);
-        let mut parts: Vec<usize> = ends.chain(changes).chain([samples]).collect();
-        parts.sort_unstable();
-        parts.dedup();
-        parts
+        let mut cuts: Vec<usize> = ends.chain(changes).collect();
+        cuts.sort_unstable();
+        cuts.dedup();
+        cuts
     }
 
     /// Runs a window, `begin` samples after the first of each piece, and turns predicted outputs into prediction errors.
     fn fill(&mut self, begin: usize, samples: usize, reached: &mut [Reached]) {
         let mut done = 0;
-        for end in self.parts(begin, samples) {
+        for end in self.cuts(begin, samples).into_iter().chain([samples]) {
             self.predict(begin, done, end);
             for (lane, reached) in reached.iter_mut().enumerate() {
                 if begin + end == self.pieces[lane].samples.len() {
