@@ -19,7 +19,7 @@ pub(crate) struct Check {
     examine: Examine,
     /// What rules it out.
     pub unless: &'static [Unless],
-    /// Whether it asks about what is of use only where no check before it finds the estimate not usable.
+    /// Whether it is left out once a check before it finds the estimate not usable.
     pub of_usable: bool,
     /// The passes over the data that it may take.
     pub costs: &'static [Pass],

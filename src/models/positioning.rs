@@ -175,7 +175,8 @@ impl Model for PositioningLoop {
         ControlledAxisMotion { moved: S::from(0.0), before: x.moved, held: self.command(x, u), ..*x }
     }
 
-    /// What the controller kept has no part in what follows, but for how far the axis has moved.
+    /// The command before the first sample has no effect. The movement in the last interval before it is estimated, that in the interval before taken
+    /// as zero.
     #[inline]
     fn initial<S: Scalar>(&self, _u: &Reference<S>, _p: &AxisParameters<S>) -> ControlledAxisMotion<S> {
         let (still, unsaid) = (S::from(0.0), S::from(f64::NAN));

@@ -41,7 +41,7 @@ impl<S: Scalar> Between<S> {
         Between { interval, crossed, u0: u0.into_iter().map(S::from).collect(), u1, parts: vec![], part }
     }
 
-    /// Crossed by the transition over this length (s), which all have that differ by rounding.
+    /// The same interval, whose transition is computed for this length (s): lengths that differ by rounding have one transition.
     pub fn crossed_as(self, length: f64) -> Self {
         Between { crossed: length, ..self }
     }

@@ -14,7 +14,7 @@ const STEPS: usize = 100;
 const HALVINGS: usize = 30;
 /// A step by this part of the state is the last but one: the next is by the square of it.
 const LAST: f64 = 1e-9;
-/// A jump below this part of the largest state or step is what the last step left.
+/// A jump below this part of the largest state or step is the rounding of the last Newton step.
 const JUMP: f64 = 1e-6;
 /// A singular value below this part of the largest, of slopes whose rows and columns are scaled, is rounding.
 const SINGULAR: f64 = 1e-13;
@@ -75,7 +75,7 @@ impl Rest {
             let shortest = LAST * longest.max(length(&x));
             longest = longest.max(length(&x)).max(length(step.as_slice()));
             if length(step.as_slice()) <= shortest {
-                // A rate that what the sample adds makes up for, such as of a first dose, is no rest.
+                // A derivative that the jump cancels, such as under a dose at the first sample, is no state of rest.
                 let at_rest: Vec<Duals> = x.iter().map(|x| Dual::constant(*x)).collect();
                 let jumps: Vec<f64> = jumped(filter, &between, &at_rest, &p).iter().map(|jump| jump.value).collect();
                 return match length(&jumps) <= JUMP * longest {

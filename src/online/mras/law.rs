@@ -71,7 +71,10 @@ impl<M: Model, const N: usize> AdaptationLaw<M> for Gradient<Of<M::Parameters, f
         let p = M::Parameters::from_fn(|i| Dual::<N>::variable(p.as_ref()[i], i));
         let (x, u) = (M::State::map(*now.x, Dual::from), M::Input::map(*now.u, Dual::from));
         let (f, scale) = match M::KIND {
-            Kind::Continuous => (now.model.derivative(Dual::from(now.t), &x, &u, &p), 1.0),
+            Kind::Continuous => {
+                let x = now.model.jump(Dual::from(now.t), &x, &u, &p);
+                (now.model.derivative(Dual::from(now.t), &x, &u, &p), 1.0)
+            }
             Kind::Discrete => (now.model.next(Dual::from(now.t), &x, &u, &p), 1.0 / now.ts),
             Kind::Static => (x, 0.0),
         };

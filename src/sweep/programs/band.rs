@@ -2,9 +2,9 @@
 
 use core::f64::consts::PI;
 
-/// Bands of an octave.
+/// Bands per factor of two of the length.
 const BANDS: f64 = 4.0;
-/// Lengths of a band at which the numbers are computed. Decays, however fast, and what they leave are known between them to some 1e-15.
+/// Nodes of the polynomial of a band. Twelve interpolate exponential decays of any rate, and their integrals, to some 1e-15.
 pub(super) const NODES: usize = 12;
 
 /// Numbers by their polynomial in the length, through Chebyshev's points.

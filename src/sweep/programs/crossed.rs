@@ -15,10 +15,10 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// Lengths of a record in one band from which on a polynomial is worth it.
 const MANY: usize = 2 * NODES;
-/// How far the polynomial may be off where it is worst, beside the begin of its band; it is near rounding but for plants that swing around more than once
-/// from sample to sample.
+/// Largest error of the polynomial that is accepted, at the begin of its band, where it is largest. It is that of rounding, but for plants that
+/// oscillate more than once between two samples.
 const NEAR: f64 = 1e-11;
-/// Most numbers that are kept of a set of parameters; those of further lengths are computed whenever they are needed.
+/// Largest count of numbers that are cached for a set of parameters; those of further lengths are computed each time.
 const KEPT: usize = 1_000_000;
 
 /// Linear equations, and the numbers that were computed last: the pieces of a record share them.
@@ -121,7 +121,7 @@ impl<'r> Crossing<'r> {
         Crossing { crossed, lanes: pieces.iter().map(lane).collect() }
     }
 
-    /// Prepares the group for the intervals after the samples that are so many after the first of each lane's piece.
+    /// Gives each lane the numbers of the interval that begins so many samples after the first of its piece.
     pub fn enter(&mut self, group: &mut Group, pieces: &[Piece<'_>], after: usize) {
         let mut changed = false;
         for (number, lane) in self.lanes.iter_mut().enumerate() {
@@ -137,8 +137,7 @@ impl<'r> Crossing<'r> {
         }
     }
 
-    /// How many samples after the first of these, which are counted from the first of each lane's piece, the length of the interval changes in a
-    /// lane.
+    /// At which offsets into `counted`, a range of samples after the first of each lane's piece, the length of the interval changes in a lane.
     pub fn changes(&self, pieces: &[Piece<'_>], counted: Range<usize>) -> Vec<usize> {
         let mut found = vec![];
         for (number, Lane { lengths, .. }) in self.lanes.iter().enumerate().filter(|(_, lane)| lane.lengths.count() > 1)
