@@ -79,6 +79,15 @@ impl<S: Scalar> Transition<S> {
         transition
     }
 
+    /// Over an interval that begins with a jump of the state by these slopes.
+    pub fn after(mut self, jump: &[S]) -> Self {
+        let n = self.n;
+        self.added.iter_mut().step_by(n + 1).for_each(|entry| *entry += 1.0);
+        self.added = product(n, &self.added, jump);
+        self.added.iter_mut().step_by(n + 1).for_each(|entry| *entry -= 1.0);
+        self
+    }
+
     /// The covariance that the noise of a continuous plant leaves in the end.
     pub fn at_rest(n: usize, a: &[S], q: &[S]) -> Result<Vec<S>, Restless> {
         let values: Vec<f64> = a.iter().map(Scalar::value).collect();

@@ -17,7 +17,8 @@ pub enum InitialCovariance {
     #[default]
     Declared,
     /// That of a plant that has been disturbed for long: the solution of `A P + P A' + Q = 0`, of a discrete model of `P = A P A' + Q`, with
-    /// the slopes `A` of the model at the initial state and the inputs of the first sample, and the diffusion `Q`. A plant that does not come to
+    /// the slopes `A` of the model at the initial state and the inputs of the first sample, and the diffusion `Q`; where samples change the state
+    /// ([`Model::jump`](crate::Model::jump)), that of the step from the first sample to the next, taken for all. A plant that does not come to
     /// rest has none ([`Error::NotStationary`](crate::Error::NotStationary)).
     Stationary,
     /// What the diffusion adds in the first sampling interval, the integral of `e^{As} Q e^{A's}` over it with the same `A`; of a discrete model
@@ -65,6 +66,13 @@ impl InitialCovariance {
         }
         let found = match (self, kind) {
             (InitialCovariance::Stationary, Kind::Discrete) => Transition::discrete(n, a, q).forever(),
+            // What samples change of the state is a part of its step; that of the first interval is taken for all.
+            (InitialCovariance::Stationary, _) if plant.jumps() && plant.length().value() > 0.0 => {
+                let mut jump = vec![S::from(0.0); n * n];
+                plant.jump_slopes(x, &mut jump);
+                let per_second = |Restless { state, rate }| Restless { state, rate: rate / plant.length().value() };
+                Transition::over(n, &a, &q, plant.length()).after(&jump).forever().map_err(per_second)
+            }
             (InitialCovariance::Stationary, _) => Transition::at_rest(n, &a, &q),
             _ => Ok(Transition::over(n, &a, &q, plant.length()).covariance()),
         };

@@ -86,10 +86,10 @@ fn started(equations: &Equations, slopes: Option<&Slopes>, predictor: &dyn Predi
     };
     let rest = match (predictor.starts_from(), slopes) {
         (StartsFrom::InitialNoise, _) => of(equations.graph(), &roots.initial_noise),
-        (StartsFrom::Slopes, Some(Slopes { state, .. })) => {
+        (StartsFrom::Slopes, Some(Slopes { state, jump, .. })) => {
             // Inputs may be late.
             let levels = of(equations.graph(), &[&*roots.diffusion, &roots.delay].concat());
-            [levels, of(&state.graph, &state.entries)].concat()
+            [levels, of(&state.graph, &state.entries), of(&jump.graph, &jump.entries)].concat()
         }
         _ => all.clone(),
     };
