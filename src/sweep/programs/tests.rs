@@ -128,9 +128,15 @@ fn compare(model: &Pendulum, predictor: impl Predictor, uniform: bool, hold: Hol
             let start = |sweep: &dyn Sweep| sweep.start(&records[i], &[0.3, -0.2], &all_p[i]).unwrap();
             let Reached { carry, slopes: all } = start(&*plain);
             for other in [start(&*evaluated), start(&*programs)] {
-                let pairs = carry.iter().zip(&other.carry).chain(all.iter().zip(&other.slopes));
-                // Some dozens of roundings.
-                pairs.for_each(|(a, b)| assert!((a - b).abs() < 1e-12, "start of record {i}: {a} {b}"));
+                let pairs = |a: &[f64], b: &[f64], roundings: f64| {
+                    for (a, b) in a.iter().zip(b) {
+                        assert!((a - b).abs() < roundings, "start of record {i}: {a} {b}");
+                    }
+                };
+                pairs(&carry, &other.carry, 1e-12);
+                // Those of the covariance at rest are some hundred roundings of numbers up to ten, in a plant that forgets a tenth of
+                // its motion per radian; that of angle and speed is zero, its slopes are rounding alone.
+                pairs(&all, &other.slopes, 1e-11);
             }
             let column = |seed: &Seed| match *seed {
                 Seed::Carry(i) => i,
