@@ -31,6 +31,7 @@ mod whitening;
 pub(crate) use batches::each;
 pub(crate) use checkpoint::CheckpointFile;
 pub(crate) use control::Control;
+pub(crate) use curvature::{Bend, curvatures_together};
 pub(crate) use finer::{Finer, FinerSweeps, MakeSweep, PARTS, SUBSTEPS};
 pub(crate) use fingerprint::Fingerprint;
 pub use objective::Objective;

@@ -9,8 +9,10 @@ use crate::covariance::SearchEnd;
 use crate::error::Error;
 use crate::estimate::Summary;
 use crate::judge::{conclude, conclude_from};
-use crate::optimize::{Domain, Infeasible, LeastSquares, Linearization, Machine, Outcome, Request};
-use crate::problem::{At, Control, Objective, Problem, Round, Whitening, each, linearize_together, noise};
+use crate::optimize::{Domain, Infeasible, Linearization, Machine, Outcome, Request};
+use crate::problem::{
+    At, Bend, Control, Objective, Problem, Round, Whitening, curvatures_together, each, linearize_together, noise,
+};
 use crate::residuals::residuals_together;
 use std::time::Instant;
 
@@ -80,6 +82,14 @@ impl<'p> Search<'p> {
         }
     }
 
+    /// Where it requests the second derivatives of the errors, and along which direction; nothing where they have none.
+    pub fn bends(&self) -> Option<Bend<'_>> {
+        match self.machine.request() {
+            Request::Curvature { x, along } => Some(Bend { objective: &self.objective, x, along }),
+            _ => None,
+        }
+    }
+
     /// Trial steps so far.
     pub fn trials(&self) -> u64 {
         self.rounds.iterations() + self.iterations
@@ -100,16 +110,20 @@ impl<'p> Search<'p> {
             (begun, _) => self.iterations += u64::from(begun),
         }
         self.machine.tell(answer);
-        loop {
-            match self.machine.request() {
-                Request::Linearize(_) => return Stage::Searching(self),
-                Request::Curvature { x, along } => {
-                    let answer = self.objective.curvature(x, along);
-                    self.machine.tell_curvature(answer);
-                    self.evaluations += 1;
-                }
-                Request::Ended(outcome) => return self.end(outcome),
-            }
+        self.next()
+    }
+
+    /// Passes on the second derivatives and advances the search to its next request.
+    pub fn bend(mut self: Box<Self>, answer: Option<Result<Linearization, Infeasible>>) -> Stage<'p> {
+        self.evaluations += 1;
+        self.machine.tell_curvature(answer);
+        self.next()
+    }
+
+    fn next(self: Box<Self>) -> Stage<'p> {
+        match self.machine.request() {
+            Request::Ended(outcome) => self.end(outcome),
+            _ => Stage::Searching(self),
         }
     }
 
@@ -239,9 +253,24 @@ fn by_one_method(problems: &[From<'_>], control: &Control) -> Vec<Result<Summary
                 stages[i] = search.tell(answer);
             }
         }
+        bend(&mut stages);
     }
     let starts: Vec<&Start> = problems.iter().map(|(_, start)| start).collect();
     conclude_together(&plain, stages, &starts, control, begin)
+}
+
+/// Passes on the second derivatives that searches request, of all in one pass.
+fn bend(stages: &mut [Stage<'_>]) {
+    let bending = stages.iter().enumerate().filter_map(|(i, stage)| match stage {
+        Stage::Searching(search) => Some((i, search.bends()?)),
+        _ => None,
+    });
+    let (bending, bends): (Vec<usize>, Vec<Bend<'_>>) = bending.unzip();
+    for (i, answer) in bending.into_iter().zip(curvatures_together(&bends)) {
+        if let Stage::Searching(search) = std::mem::replace(&mut stages[i], Stage::Alone) {
+            stages[i] = search.bend(answer);
+        }
+    }
 }
 
 /// Estimates the noise where rounds have ended, in one pass.

@@ -13,7 +13,10 @@ use crate::error::{Error, Failure};
 use crate::estimate::Starts;
 use crate::numeral::number;
 use crate::optimize::{Infeasible, LeastSquares, Linearization};
-use crate::problem::{At, CheckpointFile, Lead, Objective, Optimizer, SearchPlan, each, linearize_together, noise};
+use crate::problem::{
+    At, Bend, CheckpointFile, Lead, Objective, Optimizer, SearchPlan, curvatures_together, each, linearize_together,
+    noise,
+};
 use minima::{Comparison, End};
 use progress::{Places, Progress};
 use serde::{Deserialize, Serialize};
@@ -160,6 +163,14 @@ impl<'p> Run<'p> {
         Run::at(search.tell(answer), plain, comparison)
     }
 
+    /// Passes on second derivatives.
+    fn bent(self, answer: Option<Answer>, plain: &Objective<'_>, comparison: &Comparison) -> Run<'p> {
+        match self {
+            Run::Searching(search) => Run::at(search.bend(answer), plain, comparison),
+            other => other,
+        }
+    }
+
     fn at(stage: Stage<'p>, plain: &Objective<'_>, comparison: &Comparison) -> Run<'p> {
         match stage {
             Stage::Searching(search) => Run::Searching(search),
@@ -253,7 +264,25 @@ impl<'p> Searches<'p> {
         for (&i, run) in requesting.iter().zip(told) {
             self.runs[i] = run.unwrap_or_else(lost);
         }
+        self.bend();
         !requesting.is_empty()
+    }
+
+    /// Gives second derivatives to the searches that request them.
+    fn bend(&mut self) {
+        let bending = self.runs.iter().enumerate().filter_map(|(i, run)| match run {
+            Run::Searching(search) => Some((i, search.bends()?)),
+            _ => None,
+        });
+        let (bending, bends): (Vec<usize>, Vec<Bend<'_>>) = bending.unzip();
+        let answers = match self.wide && bends.len() >= TOGETHER {
+            true => curvatures_together(&bends),
+            false => each(bends.len(), |i| bends[i].objective.curvature(bends[i].x, bends[i].along)),
+        };
+        for (i, answer) in bending.into_iter().zip(answers) {
+            let run = std::mem::replace(&mut self.runs[i], Run::Failed(NoEnd::new(true, "")));
+            self.runs[i] = run.bent(answer, self.plain, &self.comparison);
+        }
     }
 
     /// Gives up the searches whose cost is not among so many of the lowest.

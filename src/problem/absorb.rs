@@ -52,11 +52,28 @@ impl<'o> Absorber<'o> {
                 self.square(window);
             }
         } else {
-            self.weigh(window);
+            self.weigh(window, &mut []);
         }
         if window.has_variances() {
             self.absorb_rows(window.lanes(), window.width, window.variance_rows_mut(), count);
         }
+        self.absorb_rows(window.lanes(), window.width, window.rows_mut(), count);
+    }
+
+    /// Absorbs a window whose errors `replace` exchanges for other numbers, by numbers `beside` them, row by row and lane by lane. Weights are those of the
+    /// errors.
+    pub fn absorb_instead(
+        &mut self,
+        window: &mut Window,
+        beside: &mut [f64],
+        replace: impl FnOnce(&mut Window, &[f64]),
+    ) {
+        let count = window.len() * window.outputs();
+        match self.plain {
+            true => self.count(window),
+            false => self.weigh(window, beside),
+        }
+        replace(window, beside);
         self.absorb_rows(window.lanes(), window.width, window.rows_mut(), count);
     }
 
@@ -86,8 +103,8 @@ impl<'o> Absorber<'o> {
         }
     }
 
-    /// Multiplies rows by the roots of their weights.
-    fn weigh(&mut self, window: &mut Window) {
+    /// Multiplies rows by the roots of their weights, and what is beside their errors, if anything is.
+    fn weigh(&mut self, window: &mut Window, beside: &mut [f64]) {
         let (lanes, last) = (window.lanes(), window.columns() - 1);
         let outputs = window.outputs();
         for (k, j) in (0..window.len()).flat_map(|k| (0..outputs).map(move |j| (k, j))) {
@@ -101,6 +118,7 @@ impl<'o> Absorber<'o> {
                     row[last * lanes + lane] = error;
                 };
                 weigh(window.row_mut(k, j), first);
+                beside.iter_mut().skip((k * outputs + j) * lanes + lane).take(1).for_each(|one| *one *= first.0);
                 if window.has_variances() {
                     weigh(window.variance_row_mut(k, j), second);
                     self.rows[lane] += 1;

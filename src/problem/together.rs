@@ -1,6 +1,6 @@
 //! Passes over the single records of several problems, in parallel lanes.
 
-use super::batches::in_batches;
+use super::batches::{Broken, in_batches};
 use super::job::Job;
 use super::linearize::parts;
 use super::pass::gather;
@@ -31,10 +31,10 @@ pub(crate) fn gather_together<A: Accumulate>(points: &[At<'_>], make: impl Fn(us
 }
 
 /// Runs the records of all points; those that fail are left out, and the others run again without them.
-fn together<T: Send>(
+pub(super) fn together<T: Send>(
     points: &[At<'_>],
     slopes: bool,
-    run: impl Fn(&[usize], &[&Job<'_>]) -> Result<Vec<T>, super::batches::Broken> + Sync,
+    run: impl Fn(&[usize], &[&Job<'_>]) -> Result<Vec<T>, Broken> + Sync,
 ) -> Vec<(usize, T)> {
     let of = |(objective, x): &At<'_>| objective.problem.unknowns.of_experiment(0, x);
     let values: Vec<Values> = points.iter().map(of).collect();
