@@ -294,10 +294,10 @@ pub enum Error {
         /// Why there is none.
         reason: String,
     },
-    /// States that were asked for by a predictor other than a Kalman filter.
+    /// States that were asked for by a predictor other than a filter of the model's noise.
     #[error(
-        "states are filtered and smoothed by a Kalman filter, and this is {predictor}; take the predictor Kalman, with Model::diffusion and \
-         Model::noise"
+        "states are filtered and smoothed by a Kalman filter, and this is {predictor}; take the predictor Kalman or SecondOrder, with \
+         Model::diffusion and Model::noise"
     )]
     NotFiltered {
         /// The predictor.

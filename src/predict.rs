@@ -16,6 +16,7 @@ mod symbolic;
 pub use crate::moments::Moments;
 pub(crate) use between::Between;
 pub use free_run::FreeRun;
+pub(crate) use gaussian::transition;
 pub use given_noise::GivenNoise;
 pub use horizon::Horizon;
 pub use initial::InitialCovariance;
@@ -62,7 +63,8 @@ pub trait Predictor: Debug + Clone + Send + Sync + 'static {
         None
     }
 
-    /// Whether it asks for slopes with respect to the state ([`Plant::state_slopes`], [`Plant::output_slopes`]). A model that cannot be read as
+    /// Whether it asks for slopes with respect to the state ([`Plant::state_slopes`], [`Plant::output_slopes`], [`Plant::jump_slopes`]) or for
+    /// moments. A model that cannot be read as
     /// a graph has them only if it is affine in its state; others are refused ([`Error::NotAffine`]).
     fn needs_slopes(&self) -> bool {
         false
@@ -121,7 +123,7 @@ pub enum StartsFrom {
     Anything,
     /// The parameters of [`Plant::initial_noise`].
     InitialNoise,
-    /// What [`Plant::state_slopes`] and [`Plant::diffusion`] depend on.
+    /// What [`Plant::state_slopes`], [`Plant::jump_slopes`] and [`Plant::diffusion`] depend on, and dead times of inputs.
     Slopes,
 }
 
@@ -157,6 +159,8 @@ pub(crate) trait Prediction: Debug + Send + Sync {
     fn second_order(&self) -> Option<Arc<dyn Prediction>>;
     /// Whether it is a filter of the model's process noise, of first or second order.
     fn is_filter(&self) -> bool;
+    /// Whether it is such a filter of second order.
+    fn is_second_order(&self) -> bool;
     fn check(&self, layout: &Layout) -> Result<(), Error>;
     fn describe(&self) -> String;
     fn values(&self) -> &dyn Steps<f64>;
@@ -234,9 +238,12 @@ impl<P: Predictor> Prediction for P {
     }
 
     fn is_filter(&self) -> bool {
+        Prediction::is_second_order(self) || Prediction::second_order(self).is_some()
+    }
+
+    fn is_second_order(&self) -> bool {
         let this: &dyn Any = self;
-        let is_second = this.is::<SecondOrder>() || this.is::<Starting<SecondOrder>>();
-        is_second || Prediction::second_order(self).is_some()
+        this.is::<SecondOrder>() || this.is::<Starting<SecondOrder>>()
     }
 
     fn check(&self, layout: &Layout) -> Result<(), Error> {

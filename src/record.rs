@@ -46,8 +46,8 @@ pub enum Initial {
     Free,
     /// It is what the first sample says, taken as exact.
     FirstSample,
-    /// The plant rests at the first sample, under the inputs there: the state whose derivative is zero (continuous), or that the next sample does
-    /// not change (discrete), near the one that the outputs suggest.
+    /// The plant rests at the first sample, under the inputs there: the state whose derivative is zero and that the sample leaves as it is
+    /// (continuous), or that the next sample does not change (discrete), near the one that the outputs suggest.
     Steady,
     /// Guess, bounds and prior of each state.
     Given(Vec<Parameter>),

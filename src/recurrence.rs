@@ -10,8 +10,8 @@ use crate::graph::{Following, Graph, Id, Leaf, Node};
 /// A recurrence: what it carries from sample to sample, what it expects of each output.
 ///
 /// Its graph is made of what is carried ([`Leaf::State`]), the sample's time, inputs and measurements, the next sample's
-/// inputs, the time between the two, and parameters. After the parameters stand, where inputs are late, the whole samples of each
-/// dead time (s), and, where linear equations are crossed exactly, the entries of their transition.
+/// inputs, the time between the two, and parameters. After the parameters stand what the predictor is given (levels of noise), where inputs are late
+/// the whole samples of each dead time (s), and where linear equations are crossed exactly the entries of their transition, each followed by its slopes.
 #[derive(Clone, Debug)]
 pub struct Recurrence {
     graph: Graph,

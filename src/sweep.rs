@@ -26,7 +26,7 @@ pub use window::Window;
 
 pub use crate::graph::Seed;
 pub use crate::predict::{Guess, Unstable};
-pub use rest::NotAtRest;
+pub use rest::{Change, NotAtRest};
 
 use crate::equations::{Diffusion, Term};
 use crate::error::{Error, Failure};
@@ -266,6 +266,19 @@ pub trait Sweep: Send + Sync {
     fn state_slopes(&self, record: &Record, sample: usize, state: &[f64], parameters: &[f64]) -> Option<Vec<f64>> {
         let _ = (record, sample, state, parameters);
         None
+    }
+
+    /// The slopes of the state after a sample of a model whose samples change it ([`Model::jump`](crate::Model::jump)), row by row; `None` of others,
+    /// and where a sweep does not give them.
+    fn jump_slopes(&self, record: &Record, sample: usize, state: &[f64], parameters: &[f64]) -> Option<Vec<f64>> {
+        let _ = (record, sample, state, parameters);
+        None
+    }
+
+    /// Whether an input has a dead time.
+    fn is_late(&self, parameters: &[f64]) -> bool {
+        let _ = parameters;
+        false
     }
 
     /// The exact cause of a failure that was noticed at `sample`: an `Err` where the simulation cannot go on. Where nothing fails,

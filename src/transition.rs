@@ -82,9 +82,10 @@ impl<S: Scalar> Transition<S> {
     /// Over an interval that begins with a jump of the state by these slopes.
     pub fn after(mut self, jump: &[S]) -> Self {
         let n = self.n;
-        self.added.iter_mut().step_by(n + 1).for_each(|entry| *entry += 1.0);
-        self.added = product(n, &self.added, jump);
-        self.added.iter_mut().step_by(n + 1).for_each(|entry| *entry -= 1.0);
+        // (I + D) J - I, where D keeps the digits of slow modes.
+        let moved = product(n, &self.added, jump);
+        let unit = |at: usize| f64::from(u8::from(at.is_multiple_of(n + 1)));
+        self.added = (0..n * n).map(|at| moved[at] + (jump[at] - unit(at))).collect();
         self
     }
 
@@ -106,7 +107,8 @@ impl<S: Scalar> Transition<S> {
             let kept = |i: usize, j: usize| self.added[i * n + j].value() + f64::from(u8::from(i == j));
             let largest = (0..n * n).map(|at| (kept(at / n, at % n) * kept(at % n, at / n)).abs());
             let largest = largest.fold(0.0, f64::max);
-            if largest <= REST {
+            // A chain that passes values on is empty after as many intervals as it has states, and shows nothing before.
+            if largest <= REST && 1 << doublings >= n {
                 // Slopes decay as the transition does, times the number of intervals.
                 (0..2).for_each(|_| self.double());
                 return Ok(self.covariance);
@@ -123,6 +125,11 @@ impl<S: Scalar> Transition<S> {
         Err(Restless { state, rate })
     }
 
+    /// What is left of the state, `e^{Ah}`.
+    pub fn kept(self) -> Vec<S> {
+        with_unit(self.n, self.added)
+    }
+
     /// The covariance that the noise leaves.
     pub fn covariance(self) -> Vec<S> {
         self.covariance
@@ -131,11 +138,10 @@ impl<S: Scalar> Transition<S> {
     /// What happens to a state and its covariance.
     pub fn crossing(self) -> Crossing<S> {
         let Transition { n, added, constant, ramp, covariance, .. } = self;
-        let kept = added.into_iter().enumerate().map(|(at, added)| if at % (n + 1) == 0 { added + 1.0 } else { added });
         let all = |entries: Vec<S>| entries.into_iter().map(Some).collect();
         Crossing {
             n,
-            kept: kept.map(Some).collect(),
+            kept: all(with_unit(n, added)),
             constant: all(constant),
             ramp: all(ramp),
             covariance: all(covariance),
@@ -158,6 +164,12 @@ impl<S: Scalar> Transition<S> {
         let square = product(n, added, added);
         added.iter_mut().zip(square).for_each(|(added, square)| *added = *added * 2.0 + square);
     }
+}
+
+/// `I + D`.
+fn with_unit<S: Scalar>(n: usize, mut added: Vec<S>) -> Vec<S> {
+    added.iter_mut().step_by(n + 1).for_each(|entry| *entry += 1.0);
+    added
 }
 
 /// The covariance of independent noises with these levels, row by row.
@@ -288,6 +300,27 @@ mod tests {
         let end = |rate: f64| Transition::over(1, &[-rate], &[1.0], 1.0).covariance()[0];
         assert!((end(1e20) * 2e20 - 1.0).abs() < 1e-12, "{}", end(1e20));
         assert!(end(1e40).is_nan() && end(f64::INFINITY).is_nan() && end(f64::NAN).is_nan());
+    }
+
+    /// Noise that passes along a chain of eight memories stands in each of them: `P = I` of `x1 = w`, `x2 = x1`, ... at the next sample. All products of an
+    /// entry and its mirror image are zero from the first step on.
+    #[test]
+    fn of_a_chain_that_passes_values_on() {
+        const N: usize = 8;
+        let (mut a, mut q) = (vec![0.0; N * N], vec![0.0; N * N]);
+        q[0] = 1.0;
+        (1..N).for_each(|i| a[i * N + i - 1] = 1.0);
+        let found = Transition::discrete(N, a, q).forever().ok().unwrap();
+        assert!((0..N * N).all(|at| found[at] == f64::from(u8::from(at % (N + 1) == 0))), "{found:?}");
+    }
+
+    /// An interval after a jump of nothing keeps the digits of a mode of 1e5 s over 0.1 ms: at rest `P = 1 / 2m`.
+    #[test]
+    fn slow_modes_after_a_jump() {
+        let (h, m) = (1e-4, 1e-5);
+        let found = Transition::over(1, &[-m], &[1.0], h).after(&[1.0]).forever().ok().unwrap();
+        // Some thirty doublings, whose roundings add up.
+        assert!((found[0] * 2.0 * m - 1.0).abs() < 1e-13, "{}", found[0]);
     }
 
     /// Integrators, and one that is slower than the fastest state by more than can be told, do not come to rest; nor does a growing state,

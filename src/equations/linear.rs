@@ -51,11 +51,15 @@ struct Entry {
 }
 
 impl Equations {
-    /// These equations as linear ones; `None` where they are not, where their coefficients change, where an input is late, and where states jump.
+    /// These equations as linear ones; `None` where they are not, where their coefficients change, where an input is late, and where what samples
+    /// change of the state is not affine in it.
     pub(crate) fn linear(&self) -> Option<Linear> {
         let (layout, roots, graph) = (&self.layout, &self.roots, &self.graph);
-        let degrees = degrees(graph, &|leaf| matches!(leaf, Leaf::State(_) | Leaf::Input(_)));
-        let is_linear = roots.state.iter().all(|root| degrees[root.index()] <= Degree::One);
+        let at_most_one = |roots: &[Id], of: &dyn Fn(Leaf) -> bool| {
+            let degrees = degrees(graph, of);
+            roots.iter().all(|root| degrees[root.index()] <= Degree::One)
+        };
+        let is_linear = at_most_one(&roots.state, &|leaf| matches!(leaf, Leaf::State(_) | Leaf::Input(_)));
         let on = |roots: &[Id], leaf: &dyn Fn(&Leaf) -> bool| {
             let nodes = graph.nodes().iter().zip(graph.reached(roots));
             nodes.filter(|(_, reached)| *reached).any(|(node, _)| matches!(node, Node::Leaf(of) if leaf(of)))
@@ -64,8 +68,8 @@ impl Equations {
             || on(&roots.diffusion, &|leaf| !matches!(leaf, Leaf::Parameter(_)));
         let is_late = self.late().contains(&true);
         let continuous = layout.kind == Kind::Continuous && !layout.states.is_empty();
-        let jumps = !roots.jump.is_empty();
-        (continuous && is_linear && !moves && !is_late && !jumps).then(|| Linear::of(self))
+        let jumps_affinely = at_most_one(&roots.jump, &|leaf| matches!(leaf, Leaf::State(_)));
+        (continuous && is_linear && !moves && !is_late && jumps_affinely).then(|| Linear::of(self))
     }
 }
 

@@ -36,10 +36,15 @@ impl MomentsOf {
         let [slopes, curvature, third] =
             [slopes, curvature, third].map(|Jacobian { graph, entries }| sum.import(&graph, &entries));
         // g + 1/2 sum_kl P_kl d2g/dx_k dx_l
-        let means = values.iter().zip(curvature.chunks(n * n)).map(|(g, d2)| sum.smoothed(*g, d2)).collect::<Vec<_>>();
-        let slopes = slopes.iter().zip(third.chunks(n * n)).map(|(g, d2)| sum.smoothed(*g, d2)).collect::<Vec<_>>();
+        // Without states they have no entries.
+        let of = |all: &[Id], i: usize| all[i * n * n..][..n * n].to_vec();
+        let smoothed = |sum: &mut Sum, values: &[Id], second: &[Id]| -> Vec<Id> {
+            (0..values.len()).map(|i| sum.smoothed(values[i], &of(second, i))).collect()
+        };
+        let means = smoothed(&mut sum, &values, &curvature);
+        let slopes = smoothed(&mut sum, &slopes, &third);
         // 1/2 tr(H_r P H_s P)
-        let turned: Vec<Vec<Id>> = curvature.chunks(n * n).map(|h| sum.times_covariance(h)).collect();
+        let turned: Vec<Vec<Id>> = (0..values.len()).map(|i| sum.times_covariance(&of(&curvature, i))).collect();
         let pairs = (0..turned.len()).flat_map(|r| (r..turned.len()).map(move |s| (r, s)));
         let spread = pairs.map(|(r, s)| sum.half_trace(&turned[r], &turned[s])).collect();
         let (graph, roots) = sum.graph.pruned(&[means, slopes, spread].concat());

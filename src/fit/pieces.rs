@@ -36,6 +36,11 @@ impl Problem<'_> {
             .row
             .iter()
             .any(|unknown| matches!(unknown.role, Role::Parameter(_)) && unknown.experiment.is_some());
+        // The late inputs of a piece begin before it.
+        let parameters: Vec<f64> = self.unknowns.parameters.iter().map(|parameter| parameter.start).collect();
+        if self.sweep.is_late(&parameters) {
+            return None;
+        }
         let (shot, begin) = (led.shot.as_ref()?, Instant::now());
         // No more pieces than there are between nodes.
         let most = shot.nodes.iter().map(|nodes| nodes.len() + 1).max()?.min(MOST);

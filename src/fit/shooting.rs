@@ -85,6 +85,9 @@ pub(super) fn shoot(
     }
     let filter = filter.map(|filter| filter.in_units(control));
     let aim = Aim::new(problem, movement, filter, start, control).ok_or("the outputs are undefined at the start")?;
+    if aim.weight == 0.0 {
+        return Err("no measurement of an output that moves has a weight");
+    }
     let length = (movement.rate * movement.step).recip() as usize;
     let mut length = length.clamp(LEAST, longest / 2);
     let (mut best, mut evaluations): (Option<Shot>, u64) = (None, 0);

@@ -92,20 +92,24 @@ impl Problem<'_> {
         Some(errors(self, &self.start(), control)?.into_iter().enumerate().all(explained))
     }
 
-    /// The size of each state in a record: of those that the outputs give, what moves these by half their range; of the others, what moves the derivatives of
-    /// states whose size is known by that size in the time `1 / rate`.
+    /// The size of each state in a record: of those that the outputs give, what moves these by half their range; of the others, what moves states whose size
+    /// is known by that size, by their derivatives in the time `1 / rate` or at a sample.
     pub(super) fn scales(&self, record: &Record, rate: f64) -> Option<Vec<f64>> {
         let p: Vec<f64> = self.unknowns.parameters.iter().map(|parameter| parameter.start).collect();
         let Guess { state, sizes, .. } = self.sweep.guessed_state(record, &p).ok()?;
         let n = state.len();
         let mut scales = sizes;
         let slopes = self.sweep.state_slopes(record, 0, &state, &p).unwrap_or_else(|| vec![0.0; n * n]);
+        let jumps = self.sweep.jump_slopes(record, 0, &state, &p).unwrap_or_else(|| vec![0.0; n * n]);
         for _ in 0..n {
             let known = scales.clone();
             for (j, scale) in scales.iter_mut().enumerate().filter(|(_, scale)| scale.is_none()) {
-                let moved = |(i, known): (usize, &Option<f64>)| Some(rate * (*known)? / slopes[i * n + j].abs());
-                let moved =
-                    known.iter().enumerate().filter_map(moved).filter(|moved| *moved > 0.0 && moved.is_finite());
+                let moved = |(i, known): (usize, &Option<f64>)| {
+                    let at = i * n + j;
+                    Some([rate * (*known)? / slopes[at].abs(), (*known)? / jumps[at].abs()])
+                };
+                let moved = known.iter().enumerate().filter_map(moved).flatten();
+                let moved = moved.filter(|moved| *moved > 0.0 && moved.is_finite());
                 *scale = moved.min_by(f64::total_cmp);
             }
         }
@@ -265,4 +269,47 @@ impl Stages<'_> {
 /// The root of the mean square error of each output, by the predictor of a problem; `None` where it cannot be evaluated.
 fn errors(problem: &Problem<'_>, coordinates: &[f64], control: &Control) -> Option<Vec<f64>> {
     noise::errors(&problem.in_units(control), coordinates).ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::tests::{Current, Gain, Voltage};
+    use crate::{Experiment, Fit, Model, Scalar, Time, free, signals};
+
+    signals! { struct Memory { i: "A", held: "V", before: "mA" } }
+
+    /// A coil whose controller holds what follows from the sample before, in another unit.
+    #[derive(Clone)]
+    struct Held;
+
+    impl Model for Held {
+        type State = Memory;
+        type Input = Voltage;
+        type Output = Current;
+        type Parameters = Gain;
+
+        fn derivative<S: Scalar>(&self, _t: S, x: &Memory<S>, u: &Voltage<S>, p: &Gain<S>) -> Memory<S> {
+            Memory { i: u.u + x.held * 2.0 - p.a * x.i, held: S::from(0.0), before: S::from(0.0) }
+        }
+        fn jump<S: Scalar>(&self, _t: S, x: &Memory<S>, _u: &Voltage<S>, _p: &Gain<S>) -> Memory<S> {
+            Memory { i: x.i, held: x.before * -0.001, before: x.i * 1000.0 }
+        }
+        fn output<S: Scalar>(&self, _t: S, x: &Memory<S>, _u: &Voltage<S>, _p: &Gain<S>) -> Current<S> {
+            Current { i: x.i }
+        }
+    }
+
+    /// The output moves by 3 A to each side; in a third of a second so does the state by 4.5 V of `held`, which is 4,500 mA of `before` at a sample.
+    #[test]
+    fn sizes_of_states_that_act_at_samples() {
+        let outputs: Vec<Current> = (0..50).map(|k| Current { i: if k % 2 == 0 { 3.0 } else { -3.0 } }).collect();
+        let record =
+            Experiment::new(&Held, Time::Uniform { start: 0.0, step: 0.1 }, vec![Voltage { u: 0.0 }; 50], outputs);
+        let record = record.unwrap();
+        let problem = Fit::new(&Held, &record).parameters(Gain { a: free(1.0) }).problem().unwrap();
+        let found = problem.scales(record.record(), 3.0).unwrap();
+        for (found, expected) in found.iter().zip([3.0, 4.5, 4500.0]) {
+            assert!((found / expected - 1.0).abs() < 1e-12, "{found} {expected}");
+        }
+    }
 }

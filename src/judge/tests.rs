@@ -45,6 +45,9 @@ impl Sweep for Counting<'_> {
     fn state_slopes(&self, record: &Record, sample: usize, state: &[f64], p: &[f64]) -> Option<Vec<f64>> {
         self.sweep.state_slopes(record, sample, state, p)
     }
+    fn jump_slopes(&self, record: &Record, sample: usize, state: &[f64], p: &[f64]) -> Option<Vec<f64>> {
+        self.sweep.jump_slopes(record, sample, state, p)
+    }
     fn locate(
         &self, record: &Record, state: &[f64], p: &[f64], sample: usize, sigma: &[f64], stops: &dyn Fn() -> bool,
     ) -> Option<Result<Failure, Failure>> {

@@ -1,6 +1,7 @@
 //! The filter of a state that is taken as Gaussian, by the moments of the model's functions: what [`Kalman`](super::Kalman) and
 //! [`SecondOrder`](super::SecondOrder) share.
 
+use super::plant::identity;
 use super::{InitialCovariance, Moments, Plant, Predictor, StartsFrom, Unstable};
 use crate::error::Error;
 use crate::integrate::Stuck;
@@ -87,15 +88,33 @@ fn replace<S: Scalar>(carry: &mut [S], moments: Moments<S>, with_noise: impl Fn(
     }
 }
 
+/// The noise of the states at a position, added to the diagonal of a covariance or of its rate.
+fn noise_at<S: Scalar>(plant: &dyn Plant<S>, position: f64, x: &[S]) -> impl Fn(usize, usize, S) -> S + use<S> {
+    let mut noise = vec![S::from(0.0); x.len()];
+    plant.diffusion(position, x, &mut noise);
+    move |i: usize, j: usize, moved: S| if i == j { moved + noise[i] * noise[i] } else { moved }
+}
+
+/// The rate of the carry, `dx/dt = E f` and `dP/dt = A P + P A' + Q` with `A = E df/dx`: the covariance of `x` and `f(x)` is `P A'` where `x` is
+/// Gaussian (C. Stein). Returns `A`.
+fn rate<O: Order, S: Scalar>(plant: &dyn Plant<S>, position: f64, z: &[S], to: &mut [S]) -> Vec<S> {
+    let n = plant.layout().states.len();
+    let Moments { mean, slopes: a, .. } = O::state(plant, position, z);
+    to[..n].copy_from_slice(&mean);
+    let with_noise = noise_at(plant, position, &z[..n]);
+    let flow = |i: usize, j: usize| (0..n).map(|k| a[i * n + k] * z[n + entry(n, k, j)]).sum::<S>();
+    for i in 0..n {
+        for j in i..n {
+            to[n + entry(n, i, j)] = with_noise(i, j, flow(i, j) + flow(j, i));
+        }
+    }
+    a
+}
+
 fn advance<O: Order, S: Scalar>(plant: &dyn Plant<S>, carry: &mut [S]) -> Result<(), Stuck> {
     let n = plant.layout().states.len();
-    let noise_at = |position: f64, x: &[S]| {
-        let mut noise = vec![S::from(0.0); n];
-        plant.diffusion(position, &x[..n], &mut noise);
-        move |i: usize, j: usize, moved: S| if i == j { moved + noise[i] * noise[i] } else { moved }
-    };
     if plant.layout().kind == Kind::Discrete {
-        let with_noise = noise_at(0.0, carry);
+        let with_noise = noise_at(plant, 0.0, &carry[..n]);
         replace(carry, O::state(plant, 0.0, carry), with_noise);
         return Ok(());
     }
@@ -106,20 +125,34 @@ fn advance<O: Order, S: Scalar>(plant: &dyn Plant<S>, carry: &mut [S]) -> Result
         replace(carry, O::jump(plant, carry), |_, _, moved| moved);
     }
     if plant.spread(&mut carry[n..]) {
-        return plant.next(&mut carry[..n]);
+        return plant.flow(&mut carry[..n]);
     }
-    // dx/dt = E f, dP/dt = A P + P A' + Q with A = E df/dx: the covariance of x and f(x) is P A' where x is Gaussian (C. Stein).
     plant.integrate(carry, &|position, z, to| {
-        let Moments { mean, slopes: a, .. } = O::state(plant, position, z);
-        to[..n].copy_from_slice(&mean);
-        let with_noise = noise_at(position, z);
-        let flow = |i: usize, j: usize| (0..n).map(|k| a[i * n + k] * z[n + entry(n, k, j)]).sum::<S>();
-        for i in 0..n {
-            for j in i..n {
-                to[n + entry(n, i, j)] = with_noise(i, j, flow(i, j) + flow(j, i));
-            }
-        }
+        rate::<O, S>(plant, position, z, to);
     })
+}
+
+/// The matrix `F` with which the covariance of this state and the next is `P F'`: the product of the means of the slopes on the way.
+pub(crate) fn transition<O: Order>(plant: &dyn Plant<f64>, carry: &[f64]) -> Result<Vec<f64>, Stuck> {
+    let (n, carried) = (plant.layout().states.len(), carry.len());
+    if plant.layout().kind == Kind::Discrete {
+        return Ok(O::state(plant, 0.0, carry).slopes);
+    }
+    let mut z = carry.to_vec();
+    let mut begin = identity(n);
+    if plant.jumps() {
+        let moments = O::jump(plant, carry);
+        begin.clone_from(&moments.slopes);
+        replace(&mut z, moments, |_, _, moved| moved);
+    }
+    z.extend(begin);
+    plant.integrate(&mut z, &|position, z, to| {
+        let a = rate::<O, f64>(plant, position, &z[..carried], &mut to[..carried]);
+        for at in 0..n * n {
+            to[carried + at] = (0..n).map(|k| a[at / n * n + k] * z[carried + k * n + at % n]).sum();
+        }
+    })?;
+    Ok(z.split_off(carried))
 }
 
 /// A filter of some order.

@@ -10,11 +10,11 @@ use serde::{Deserialize, Serialize};
 /// is disturbed between the samples: wind, load, sun, a friction that the model lacks.
 ///
 /// Mean `x` and covariance `P` of the state are exact for a model that is affine in its state. Where it is linear with constant coefficients, `dx/dt
-/// = A x + B u + c` with `A`, `B`, `c` and the diffusion functions of parameters alone, no input late, no state that jumps, and no integrator was chosen,
+/// = A x + B u + c` with `A`, `B`, `c` and the diffusion functions of parameters alone, no input late, and no integrator was chosen (samples may change the state by an affine function of it),
 /// transition and covariance of an interval are computed once for each set of parameters and each length of the intervals, exactly, however stiff the model and
 /// long the interval (C. F. Van Loan, IEEE Transactions on Automatic Control 23 (1978) 395-404). Lengths that differ by rounding, by a part of 1e-9, are one;
-/// for a clock that jitters, whose lengths are many and close to each other, the transition is interpolated by a polynomial through twelve lengths, which is
-/// checked to 1e-11. For models that are not affine it is the extended filter: they
+/// for a clock that jitters, whose lengths are many and close to each other, the transition is interpolated by a polynomial through twelve lengths, of
+/// which `e^{Ah}` and the covariance are checked to 1e-11. For models that are not affine it is the extended filter: they
 /// follow the model and its slopes to the first order (A. H. Jazwinski, *Stochastic Processes and Filtering Theory*, 1970, section 9.3),
 ///
 /// ```text

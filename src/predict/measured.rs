@@ -6,12 +6,13 @@ use crate::information::{Information, norm};
 use crate::integrate::Duals;
 use crate::layout::{Kind, Layout, Quantity};
 use crate::numeral::exact;
+use crate::predict::plant::{identity, jacobian};
 
 const LANES: usize = 8;
 const ITERATIONS: usize = 50;
 /// A Newton step to a state where the outputs are undefined is halved this many times at most.
 const HALVINGS: usize = 30;
-/// Damping of states that the outputs do not give, relative to the largest column of slopes.
+/// Damping of states that the outputs do not give, relative to the largest slopes.
 const DAMPING: f64 = 1e-6;
 /// A state whose slopes are below this part of those at the start moves the outputs no more.
 const LOST: f64 = 1e-6;
@@ -25,6 +26,33 @@ pub(crate) struct Place<'p> {
     pub t: f64,
     pub u: &'p [f64],
     pub p: &'p [f64],
+}
+
+impl Slopes {
+    /// The states that the outputs do not determine: those of which the damping decides a part, with rows and columns in units of their largest entry.
+    fn open(&self) -> Vec<bool> {
+        let n = self.rows.first().map_or(0, Vec::len);
+        let largest = |of: &mut dyn Iterator<Item = f64>| of.fold(0.0f64, |most, entry| most.max(entry.abs()));
+        let unit = |most: f64| if most > 0.0 { most } else { 1.0 };
+        let measured = self.rows.iter().zip(&self.errors).filter(|(_, error)| error.is_finite());
+        let rows = measured.map(|(row, _)| {
+            let most = unit(largest(&mut row.iter().copied()));
+            row.iter().map(|entry| entry / most).collect()
+        });
+        let rows: Vec<Vec<f64>> = rows.collect();
+        let columns: Vec<f64> = (0..n).map(|j| unit(largest(&mut rows.iter().map(|row| row[j])))).collect();
+        let mut information = Information::new(n);
+        for row in &rows {
+            let row: Vec<f64> = row.iter().zip(&columns).map(|(entry, most)| entry / most).collect();
+            information.absorb_row(&row, 0.0);
+        }
+        let damped = information.damped(&vec![DAMPING; n]);
+        let of_damping = |i: usize| {
+            let row: Vec<f64> = (0..n).map(|j| if i == j { DAMPING } else { 0.0 }).collect();
+            damped.leverage(&row).unwrap_or(1.0)
+        };
+        (0..n).map(|i| of_damping(i) > GIVEN).collect()
+    }
 }
 
 /// A start for the state, and which of its entries the outputs do not give.
@@ -109,7 +137,10 @@ impl Place<'_> {
             for (row, &error) in at.rows.iter().zip(&at.errors).filter(|(_, error)| error.is_finite()) {
                 information.absorb_row(row, error);
             }
-            let (mut step, open) = step(&information);
+            let (mut step, open) = match information.solve() {
+                Ok(step) => (step, vec![false; n]),
+                Err(_) => (shortest_step(&information), at.open()),
+            };
             let mut next = self.moved(&x, &step, y);
             for _ in 0..HALVINGS {
                 if next.is_ok() {
@@ -179,16 +210,15 @@ impl Place<'_> {
 
     /// The slopes of the derivative (of the next state of a discrete model) with respect to the states, row by row.
     pub fn state_slopes(&self, x: &[f64]) -> Vec<f64> {
-        let (n, u, p) = (x.len(), constants(self.u), constants(self.p));
-        let (mut slopes, mut to) = (vec![0.0; n * n], vec![Dual::constant(0.0); n]);
-        for first in (0..n).step_by(LANES) {
-            self.functions.state(Dual::constant(self.t), &Self::seeded(x, first), &u, &p, &mut to);
-            for (row, to) in slopes.chunks_mut(n).zip(&to) {
-                let lanes = LANES.min(n - first);
-                row[first..first + lanes].copy_from_slice(&to.slopes[..lanes]);
-            }
-        }
-        slopes
+        let (t, u, p) = (Dual::constant(self.t), constants(self.u), constants(self.p));
+        jacobian(x, &|x, to| self.functions.state(t, x, &u, &p, to)).1.concat()
+    }
+
+    /// The slopes of the state after a sample; `None` of a model whose samples leave it as it is.
+    pub fn jump_slopes(&self, x: &[f64]) -> Option<Vec<f64>> {
+        let (t, u, p) = (Dual::constant(self.t), constants(self.u), constants(self.p));
+        let of = || jacobian(x, &|x, to| self.functions.jump(t, x, &u, &p, to)).1.concat();
+        self.functions.jumps().then(of).filter(|found| *found != identity::<f64>(x.len()))
     }
 
     /// The state in words: `x = 0, v = 0`.
@@ -212,22 +242,12 @@ impl Place<'_> {
     }
 }
 
-/// The step to the minimum, and the entries that are not determined: those take the shortest step.
-fn step(information: &Information) -> (Vec<f64>, Vec<bool>) {
+/// The step to the minimum where some entries are not determined: those take the shortest step.
+fn shortest_step(information: &Information) -> Vec<f64> {
     let n = information.columns();
-    if let Ok(step) = information.solve() {
-        return (step, vec![false; n]);
-    }
     let largest = information.column_norms().into_iter().fold(0.0, f64::max);
     let damping = if largest > 0.0 { DAMPING * largest } else { 1.0 };
-    let damped = information.damped(&vec![damping; n]);
-    // How much of an entry the row of its damping decides.
-    let of_damping = |i: usize| {
-        let row: Vec<f64> = (0..n).map(|j| if i == j { damping } else { 0.0 }).collect();
-        damped.leverage(&row).unwrap_or(1.0)
-    };
-    let open = (0..n).map(|i| of_damping(i) > GIVEN).collect();
-    (damped.solve().unwrap_or(vec![0.0; n]), open)
+    information.damped(&vec![damping; n]).solve().unwrap_or(vec![0.0; n])
 }
 
 fn names(quantities: &[Quantity]) -> String {

@@ -58,6 +58,12 @@ pub trait Plant<S> {
     /// Moments of the state after the sample, as [`state_moments`](Plant::state_moments).
     fn jump_moments(&self, carry: &[S]) -> Moments<S>;
 
+    /// Replaces the state after the sample by that at the next one: the part of [`next`](Plant::next) that follows the jump.
+    ///
+    /// # Errors
+    /// Where the integrator is [`Stuck`].
+    fn flow(&self, x: &mut [S]) -> Result<(), Stuck>;
+
     /// How long the interval is (s).
     fn length(&self) -> S;
 
@@ -145,9 +151,13 @@ impl<S: Stepped> SlicePlant<'_, S> {
             return None;
         }
         let (n, length) = (self.layout.states.len(), self.between.crossed);
-        if let Some((_, known)) = self.intervals.crossings.borrow().iter().find(|(known, _)| *known == length) {
-            return Some(known.clone());
+        let mut known = self.intervals.crossings.borrow_mut();
+        if let Some(at) = known.iter().position(|(known, _)| *known == length) {
+            // The lengths that were met last stand first.
+            known[..=at].rotate_right(1);
+            return Some(known[0].1.clone());
         }
+        drop(known);
         let none = vec![S::from(0.0); n];
         let (mut a, mut levels) = (vec![S::from(0.0); n * n], none.clone());
         self.state_slopes(0.0, &none, &mut a);
@@ -209,12 +219,16 @@ impl<S: Stepped> Plant<S> for SlicePlant<'_, S> {
     }
 
     fn next(&self, x: &mut [S]) -> Result<(), Stuck> {
+        self.jump(x);
+        self.flow(x)
+    }
+
+    fn flow(&self, x: &mut [S]) -> Result<(), Stuck> {
         let (state, _) = x.split_at_mut(self.layout.states.len());
         if let Some(crossing) = self.crossing() {
             crossing.state(state, self.between.u1.is_some(), |position, x, to| self.derivative(position, x, to));
             return Ok(());
         }
-        self.jump(state);
         let p: Vec<Duals> = self.p.iter().map(|p| Dual::constant(p.value())).collect();
         let slopes = |position: f64, x: &[f64]| {
             let t = Dual::constant(self.between.time(position).value());

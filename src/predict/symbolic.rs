@@ -151,6 +151,12 @@ impl Plant<Symbol> for SymbolicPlant<'_> {
         Ok(())
     }
 
+    fn flow(&self, x: &mut [Symbol]) -> Result<(), Stuck> {
+        let (state, _) = x.split_at_mut(self.layout().states.len());
+        self.interval.flow(state);
+        Ok(())
+    }
+
     fn derivative(&self, position: f64, x: &[Symbol], to: &mut [Symbol]) {
         self.interval.rate(position, x, to);
     }

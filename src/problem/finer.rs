@@ -90,6 +90,11 @@ impl<'a> Problem<'a> {
         self.method.checked_sub(1).and_then(|number| SUBSTEPS.get(number)).map_or(1, |steps| *steps as usize)
     }
 
+    /// Those of all samples: what a program is worth its compilation by.
+    pub(crate) fn all_steps(&self) -> usize {
+        self.samples() * self.steps()
+    }
+
     /// The problem by a finer method, numbered from the coarsest; `None` after the last.
     pub(crate) fn finer(&self, number: usize) -> Option<&Problem<'_>> {
         self.finer.as_ref()?.by(number)
@@ -110,7 +115,7 @@ impl Objective<'_> {
     /// Whether a finer step changes the cost at a point by a tenth; `None` if either cannot be evaluated there, or if there is
     /// none.
     pub(crate) fn step_decides(&self, coordinates: &[f64]) -> Option<bool> {
-        let finer = self.sweep.refined(self.problem.samples())?;
+        let finer = self.sweep.refined(self.problem.all_steps())?;
         let finer = self.of(self.problem, &*finer).cost_at(coordinates).ok()?;
         let this = self.cost_at(coordinates).ok()?;
         Some(differ(this, finer))

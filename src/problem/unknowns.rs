@@ -9,7 +9,7 @@ use crate::layout::{Kind, Layout, Quantity};
 use crate::numeral::exact;
 use crate::parameter::{Parameter, Transform, fixed, free};
 use crate::record::{Initial, Record};
-use crate::sweep::{Guess, NoStart, NotAtRest, Seed, Sweep, Unstable};
+use crate::sweep::{Change, Guess, NoStart, NotAtRest, Seed, Sweep, Unstable};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
@@ -152,14 +152,15 @@ impl Unknowns {
             NoStart::Unstable(Unstable { state, rate }) => {
                 Error::NotStationary { experiment, state: name(state), rate, per }
             }
-            NoStart::NotAtRest(NotAtRest { state, rate }) => {
+            NoStart::NotAtRest(NotAtRest { state, change }) => {
                 let unit = layout.states.get(state).map_or_else(String::new, |state| state.unit.clone());
-                let reason = match rate {
-                    Some(rate) if rate.is_nan() => {
+                let reason = match change {
+                    Change::Rate(by) | Change::AtSample(by) if by.is_nan() => {
                         "the equations are undefined where the search for it ends".to_owned()
                     }
-                    Some(rate) => format!("it still changes by {} {unit} per {per}", short(rate)),
-                    None => "it rests at any value".to_owned(),
+                    Change::Rate(by) => format!("it still changes by {} {unit} per {per}", short(by)),
+                    Change::AtSample(by) => format!("the first sample changes it by {} {unit}", short(by)),
+                    Change::Free => "it rests at any value".to_owned(),
                 };
                 Error::NotAtRest { experiment, state: name(state), reason }
             }

@@ -117,10 +117,15 @@ impl<'a> SymbolicInterval<'a> {
 
     /// The state at the next sample.
     pub fn next(&self, x: &mut [Symbol]) {
+        self.jump(x);
+        self.flow(x);
+    }
+
+    /// The state at the next sample, of that after this one.
+    pub fn flow(&self, x: &mut [Symbol]) {
         if let Some(crossing) = self.crossing() {
             return crossing.state(x, !self.holds.all_zero(), |position, x, to| self.rate(position, x, to));
         }
-        self.jump(x);
         let kind = self.equations.layout().kind;
         self.cross(kind, x, &|position, x, to| self.rate(position, x, to));
     }

@@ -1,6 +1,8 @@
 //! Eigenvalues of the model about some points along the records.
 
 use crate::problem::Objective;
+use crate::record::Record;
+use crate::transition::Transition;
 use nalgebra::{Complex, DMatrix, Schur};
 
 /// Number of points that are examined.
@@ -21,13 +23,86 @@ pub(crate) fn some(points: &[StateAt]) -> impl Iterator<Item = &StateAt> {
 
 /// The eigenvalues of the state's Jacobian at a point (1/s).
 pub(crate) fn eigenvalues(objective: &Objective<'_>, coordinates: &[f64], at: &StateAt) -> Option<Vec<Complex<f64>>> {
-    let StateAt { experiment, sample, state } = at;
-    let (record, n) = (&objective.problem.records[*experiment], state.len());
-    let parameters = objective.problem.unknowns.of_experiment(*experiment, coordinates).p;
-    let slopes = objective.sweep.state_slopes(record, *sample, state, &parameters)?;
-    if !slopes.iter().all(|slope| slope.is_finite()) {
-        return None;
-    }
-    let schur = Schur::try_new(DMatrix::from_row_slice(n, n, &slopes), f64::EPSILON, ITERATIONS)?;
+    let n = at.state.len();
+    slopes(objective, coordinates, at, &|record, p| objective.sweep.state_slopes(record, at.sample, &at.state, p))
+        .and_then(|slopes| eigenvalues_of(n, &slopes))
+}
+
+/// The decays of the state about a point (1/s), negative where it decays; of a model whose samples change the state, from one sample to the next.
+pub(crate) fn decays(objective: &Objective<'_>, coordinates: &[f64], at: &StateAt, interval: f64) -> Option<Vec<f64>> {
+    let n = at.state.len();
+    let jump = |record: &Record, p: &[f64]| objective.sweep.jump_slopes(record, at.sample, &at.state, p);
+    let Some(jump) = slopes(objective, coordinates, at, &jump) else {
+        return Some(eigenvalues(objective, coordinates, at)?.iter().map(|value| value.re).collect());
+    };
+    let state = |record: &Record, p: &[f64]| objective.sweep.state_slopes(record, at.sample, &at.state, p);
+    let a = slopes(objective, coordinates, at, &state)?;
+    let step = Transition::over(n, &a, &vec![0.0; n * n], interval).after(&jump).kept();
+    Some(eigenvalues_of(n, &step)?.iter().map(|value| value.norm().ln() / interval).collect())
+}
+
+/// Slopes at a point; `None` where there are none, or not numbers.
+fn slopes(
+    objective: &Objective<'_>,
+    coordinates: &[f64],
+    at: &StateAt,
+    of: &dyn Fn(&Record, &[f64]) -> Option<Vec<f64>>,
+) -> Option<Vec<f64>> {
+    let parameters = objective.problem.unknowns.of_experiment(at.experiment, coordinates).p;
+    let slopes = of(&objective.problem.records[at.experiment], &parameters)?;
+    slopes.iter().all(|slope| slope.is_finite()).then_some(slopes)
+}
+
+fn eigenvalues_of(n: usize, slopes: &[f64]) -> Option<Vec<Complex<f64>>> {
+    let finite = slopes.iter().all(|slope| slope.is_finite());
+    let schur = Schur::try_new(finite.then(|| DMatrix::from_row_slice(n, n, slopes))?, f64::EPSILON, ITERATIONS)?;
     Some(schur.complex_eigenvalues().iter().copied().collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tests::{Current, Gain, Voltage};
+    use crate::{Experiment, Fit, Model, Scalar, Time, fixed};
+
+    /// A current that decays with `a`, and that each sample divides by four.
+    #[derive(Clone)]
+    struct Divided;
+
+    impl Model for Divided {
+        type State = Current;
+        type Input = Voltage;
+        type Output = Current;
+        type Parameters = Gain;
+
+        fn derivative<S: Scalar>(&self, _t: S, x: &Current<S>, u: &Voltage<S>, p: &Gain<S>) -> Current<S> {
+            Current { i: u.u - p.a * x.i }
+        }
+        fn jump<S: Scalar>(&self, _t: S, x: &Current<S>, _u: &Voltage<S>, _p: &Gain<S>) -> Current<S> {
+            Current { i: x.i * 0.25 }
+        }
+        fn output<S: Scalar>(&self, _t: S, x: &Current<S>, _u: &Voltage<S>, _p: &Gain<S>) -> Current<S> {
+            *x
+        }
+    }
+
+    /// From sample to sample `e^{-a h} / 4`: a decay of `a + ln 4 / h`.
+    #[test]
+    fn decays_from_sample_to_sample() {
+        let (h, a) = (0.5, 0.3);
+        let record = Experiment::new(
+            &Divided,
+            Time::Uniform { start: 0.0, step: h },
+            vec![Voltage { u: 1.0 }; 20],
+            vec![Current { i: 1.0 }; 20],
+        )
+        .unwrap();
+        let problem = Fit::new(&Divided, &record).parameters(Gain { a: fixed(a) }).problem().unwrap();
+        let objective = problem.objective().unwrap();
+        let at = StateAt { experiment: 0, sample: 3, state: vec![0.7] };
+        let found = decays(&objective, &objective.start(), &at, h).unwrap();
+        assert!((found[0] + a + 4f64.ln() / h).abs() < 1e-14, "{found:?}");
+        let open = eigenvalues(&objective, &objective.start(), &at).unwrap();
+        assert!((open[0].re + a).abs() < 1e-14, "{open:?}");
+    }
 }

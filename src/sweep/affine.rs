@@ -32,7 +32,9 @@ pub(super) fn not_affine(layout: &Layout, functions: &dyn Functions<f64>, record
                 }
                 functions.output(t, x, &u, p, &mut output);
                 let mut after = x.to_vec();
-                functions.jump(t, x, &u, p, &mut after);
+                if layout.kind == Kind::Continuous {
+                    functions.jump(t, x, &u, p, &mut after);
+                }
                 [state, output, after].concat()
             };
             // All states, of both signs and different sizes; with the one at hand moved in addition, products of two states show.

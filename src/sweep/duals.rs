@@ -137,8 +137,7 @@ impl Sweep for DualSweep<'_> {
         parameters: &[f64],
         smoothed: bool,
     ) -> Option<Result<States, usize>> {
-        let is_kalman = self.predictor.second_order().is_some();
-        is_kalman.then(|| self.filter(parameters).states(record, carry, parameters, smoothed))
+        self.predictor.is_filter().then(|| self.filter(parameters).states(record, carry, parameters, smoothed))
     }
 
     fn measured_state(&self, record: &Record, sample: usize, p: &[f64]) -> Result<Vec<f64>, String> {
@@ -163,6 +162,15 @@ impl Sweep for DualSweep<'_> {
     fn state_slopes(&self, record: &Record, sample: usize, state: &[f64], p: &[f64]) -> Option<Vec<f64>> {
         let (t, u) = (record.time(sample), self.input(record, sample, p));
         (self.layout.kind == Kind::Continuous).then(|| self.place(t, &u, p).state_slopes(state))
+    }
+
+    fn jump_slopes(&self, record: &Record, sample: usize, state: &[f64], p: &[f64]) -> Option<Vec<f64>> {
+        let (t, u) = (record.time(sample), self.input(record, sample, p));
+        self.place(t, &u, p).jump_slopes(state)
+    }
+
+    fn is_late(&self, parameters: &[f64]) -> bool {
+        self.code.late(parameters).contains(&true)
     }
 
     fn locate(

@@ -89,7 +89,12 @@ impl FailureSearch<'_> {
                 break;
             }
             let mut next = x.clone();
-            if plant.next(&mut next) == Err(Stuck) {
+            plant.jump(&mut next);
+            if let Some((i, value, _)) = unsound(&next) {
+                let hint = if value.is_nan() { UNDEFINED_JUMP } else { OVERFLOW };
+                return broken(k, format!("state `{}` after the sample", name(i)), value, hint);
+            }
+            if plant.flow(&mut next) == Err(Stuck) {
                 if let Some((i, value)) = runaway(&x) {
                     return broken(k, format!("state `{}`", name(i)), value, OVERFLOW);
                 }
@@ -120,6 +125,8 @@ const STUCK: &str = "; no step is short enough, or 100,000 of them do not reach 
 const UNDEFINED: &str = "; the equations are undefined there (a division by zero, a root or logarithm out of its domain, \
                          or the `derivative` or `next` that Model::KIND asks for was not written): bound the parameters, \
                          or start elsewhere (parameters and initial states)";
+const UNDEFINED_JUMP: &str = "; the `jump` of the state is undefined there (a division by zero, a root or logarithm out of its domain): \
+                              bound the parameters, or start elsewhere (parameters and initial states)";
 pub(crate) const OVERFLOW: &str = "; the simulation overflows (an unstable model, or a step too long for its dynamics): \
                                    bound the parameters, take a shorter step or a stiff method, or predict over a shorter \
                                    horizon";

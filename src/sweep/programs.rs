@@ -277,6 +277,14 @@ impl Sweep for ProgramSweep<'_> {
         self.plain.state_slopes(record, sample, state, p)
     }
 
+    fn jump_slopes(&self, record: &Record, sample: usize, state: &[f64], p: &[f64]) -> Option<Vec<f64>> {
+        self.plain.jump_slopes(record, sample, state, p)
+    }
+
+    fn is_late(&self, parameters: &[f64]) -> bool {
+        self.plain.is_late(parameters)
+    }
+
     fn locate(
         &self,
         record: &Record,

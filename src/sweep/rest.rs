@@ -24,8 +24,19 @@ const SINGULAR: f64 = 1e-13;
 pub struct NotAtRest {
     /// Number of a state.
     pub state: usize,
-    /// By what it still changes where the search for a state of rest ended, per second or sample; `None` where the plant rests at any value of it.
-    pub rate: Option<f64>,
+    /// How it still changes where the search for a state of rest ended.
+    pub change: Change,
+}
+
+/// How a state changes that does not rest.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Change {
+    /// By so much per second, of a discrete model per sample.
+    Rate(f64),
+    /// By so much at a sample, which changes the state of a continuous model.
+    AtSample(f64),
+    /// The plant rests at any value of it.
+    Free,
 }
 
 /// A state of rest, and the inverse of the slopes there.
@@ -59,17 +70,19 @@ impl Rest {
         let p: Vec<Duals> = parameters.iter().map(|p| Dual::constant(*p)).collect();
         let between = Between::new(record, 0, &delays(filter.duals, &filter.late, &p));
         let slopes = |x: &[f64]| jacobian(x, &|x, to| rate(filter, &between, x, &p, to));
-        let moving = |f: &[f64]| {
+        let moving = |f: &[f64], change: fn(f64) -> Change| {
             let largest = f.iter().enumerate().max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
-            largest
-                .map_or(NotAtRest { state: 0, rate: Some(f64::NAN) }, |(state, f)| NotAtRest { state, rate: Some(*f) })
+            largest.map_or(NotAtRest { state: 0, change: Change::Rate(f64::NAN) }, |(state, f)| NotAtRest {
+                state,
+                change: change(*f),
+            })
         };
         let mut x = state.to_vec();
         let (mut f, mut rows) = slopes(&x);
         // The largest state or step so far: where the state of rest is zero, a step of rounding is short against it.
         let mut longest = 0.0f64;
         for _ in 0..STEPS {
-            let Some(Inverse { inverse, units }) = inverse(&rows, &f)? else { return Err(moving(&f)) };
+            let Some(Inverse { inverse, units }) = inverse(&rows, &f)? else { return Err(moving(&f, Change::Rate)) };
             let step = -(&inverse * DVector::from_column_slice(&f));
             let length = |of: &[f64]| of.iter().zip(&units).map(|(x, unit)| (x / unit).abs()).fold(0.0, f64::max);
             let shortest = LAST * longest.max(length(&x));
@@ -80,7 +93,7 @@ impl Rest {
                 let jumps: Vec<f64> = jumped(filter, &between, &at_rest, &p).iter().map(|jump| jump.value).collect();
                 return match length(&jumps) <= JUMP * longest {
                     true => Ok(Rest { state: x, inverse }),
-                    false => Err(moving(&jumps)),
+                    false => Err(moving(&jumps, Change::AtSample)),
                 };
             }
             let shortened = (0..HALVINGS).find_map(|halvings| {
@@ -92,10 +105,10 @@ impl Rest {
                 let finite = f.iter().chain(rows.iter().flatten()).all(|entry| entry.is_finite());
                 (finite && shorter).then_some((there, f, rows))
             });
-            let Some((there, next, slopes)) = shortened else { return Err(moving(&f)) };
+            let Some((there, next, slopes)) = shortened else { return Err(moving(&f, Change::Rate)) };
             (x, f, rows) = (there, next, slopes);
         }
-        Err(moving(&f))
+        Err(moving(&f, Change::Rate))
     }
 
     /// The state of rest in numbers with slopes: one more Newton step. The slopes of the inverse are left out, since they multiply a rate of zero
@@ -136,7 +149,7 @@ fn inverse(rows: &[Vec<f64>], f: &[f64]) -> Result<Option<Inverse>, NotAtRest> {
     let scaled = DMatrix::from_fn(n, n, |i, j| scaled[(i, j)] * of_columns[j]);
     let svd = scaled.svd(true, true);
     let (least, largest) = (svd.singular_values.argmin(), svd.singular_values.max());
-    let free = |v: &DMatrix<f64>| NotAtRest { state: v.row(least.0).transpose().iamax(), rate: None };
+    let free = |v: &DMatrix<f64>| NotAtRest { state: v.row(least.0).transpose().iamax(), change: Change::Free };
     match svd.v_t.as_ref() {
         Some(v) if least.1 <= SINGULAR * largest => Err(free(v)),
         _ => {

@@ -1,4 +1,4 @@
-//! [`States`]: the states of a record by a Kalman filter, and smoothed by all measurements.
+//! [`States`]: the states of a record by a filter, and smoothed by all measurements.
 
 use super::Prepared;
 use super::filtered::{Filter, SLOPES};
@@ -7,7 +7,7 @@ use crate::functions::delays;
 use crate::integrate::{Duals, Stuck};
 use crate::layout::Layout;
 use crate::moments::entry;
-use crate::predict::{Intervals, Plant};
+use crate::predict::{Intervals, Plant, SecondOrder, transition};
 use crate::record::Record;
 
 /// The states of a record with their covariance, by the parameters and the initial state of an estimate, whose own uncertainty is not in it.
@@ -75,8 +75,14 @@ impl Filter<'_> {
                 if !(error.is_finite() && variance > 0.0 && variance.is_finite()) {
                     return Err(k);
                 }
-                let mut rows = vec![0.0; outputs * n];
-                plant.output_slopes(&carry[..n], &mut rows);
+                let rows = match self.predictor.is_second_order() {
+                    true => plant.output_moments(&carry).slopes,
+                    false => {
+                        let mut rows = vec![0.0; outputs * n];
+                        plant.output_slopes(&carry[..n], &mut rows);
+                        rows
+                    }
+                };
                 let row = rows[j * n..][..n].to_vec();
                 let moved = |i: usize| (0..n).map(|l| carry[n + entry(n, i, l)] * row[l]).sum::<f64>() / variance;
                 let gain = (0..n).map(moved).collect();
@@ -84,10 +90,14 @@ impl Filter<'_> {
                 steps.correct(&plant, &mut carry, j, error);
             }
             let (after, last) = (carry.clone(), k + 1 == record.len());
+            // To the second order the mean depends on the covariance, too. Linear equations that are crossed exactly have no curvature.
+            let of_means = self.predictor.is_second_order() && !self.method.is_exact();
             let slopes = match smoothed && !last {
-                true => self.slopes(from, k, &carry, &constant, &of_slopes).map_err(|Stuck| k + 1)?,
-                false => vec![],
+                true if of_means => transition::<SecondOrder>(&plant, &carry),
+                true => self.slopes(from, k, &carry, &constant, &of_slopes),
+                false => Ok(vec![]),
             };
+            let slopes = slopes.map_err(|Stuck| k + 1)?;
             visited.push(Visited { updates, carry: after, slopes });
             if !last {
                 steps.advance(&plant, &mut carry).map_err(|Stuck| k + 1)?;

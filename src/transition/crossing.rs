@@ -62,6 +62,11 @@ impl<S: Scalar> Crossing<S> {
 }
 
 impl Crossing<f64> {
+    /// Whether the end is finite, and its covariance.
+    pub fn is_finite(&self) -> bool {
+        self.kept.iter().chain(&self.covariance).flatten().all(|number| number.is_finite())
+    }
+
     /// Whether the end is the other's to this part of the terms that it is a sum of, whatever the units of the states; not where a number is none.
     pub fn is_near(&self, other: &Self, part: f64) -> bool {
         let n = self.n;

@@ -2,7 +2,7 @@
 
 use crate::common::Noise;
 use argmin::core::{CostFunction, Gradient};
-use greybox::online::{Ekf, EkfStart, Watch};
+use greybox::online::{AdaptationLaw, Ekf, EkfStart, Moment, Rate, Watch};
 use greybox::predict::GivenNoise;
 use greybox::*;
 
@@ -140,6 +140,75 @@ fn a_sampled_part_is_a_part_of_the_step() {
     assert!((extended - second).abs() > 1e-6, "the curvature of the jump shows: {extended} {second}");
 }
 
+/// The same without curvature: an integral controller.
+#[derive(Clone)]
+struct Integral;
+
+impl Model for Integral {
+    type State = Plant;
+    type Input = Reference;
+    type Output = Measured;
+    type Parameters = Loop;
+
+    fn derivative<S: Scalar>(&self, t: S, x: &Plant<S>, u: &Reference<S>, p: &Loop<S>) -> Plant<S> {
+        Sampled::<false, false>.derivative(t, x, u, p)
+    }
+    fn jump<S: Scalar>(&self, _t: S, x: &Plant<S>, u: &Reference<S>, p: &Loop<S>) -> Plant<S> {
+        Plant { x: x.x + u.dose, z: x.z + p.k * (u.r - x.x) }
+    }
+    fn diffusion<S: Scalar>(&self, t: S, x: &Plant<S>, u: &Reference<S>, p: &Loop<S>) -> Plant<S> {
+        Sampled::<false, false>.diffusion(t, x, u, p)
+    }
+    fn noise<S: Scalar>(&self, t: S, x: &Plant<S>, u: &Reference<S>, p: &Loop<S>) -> Measured<S> {
+        Sampled::<false, false>.noise(t, x, u, p)
+    }
+    fn output<S: Scalar>(&self, t: S, x: &Plant<S>, u: &Reference<S>, p: &Loop<S>) -> Measured<S> {
+        Sampled::<false, false>.output(t, x, u, p)
+    }
+}
+
+/// Filters of a plant that is linear between the samples cross the intervals exactly, the sampled part included: cost and gradient are those of the step as
+/// a discrete model to rounding, and on uneven samples those of 60 steps of Runge-Kutta's method, which leave some 1e-10 of the largest; the states too.
+#[test]
+fn intervals_after_a_jump_are_crossed_exactly() {
+    let start = Loop { c: fixed(0.0), ..Loop::map(AT, free) };
+    let costs = |problem: greybox::problem::Problem<'_>| {
+        let objective = problem.objective().unwrap();
+        let at = objective.start();
+        [vec![objective.cost(&at).unwrap()], objective.gradient(&at).unwrap()].concat()
+    };
+    let agree = |found: Vec<f64>, expected: Vec<f64>, close: f64| {
+        let size = expected.iter().fold(0.0, |size: f64, one| size.max(one.abs()));
+        for (found, expected) in found.iter().zip(&expected) {
+            assert!((found - expected).abs() < close * size, "{found} {expected}");
+        }
+    };
+    let (even, discrete) = (record(&Integral, 300), record(&Sampled::<true, false>, 300));
+    for initial in [InitialCovariance::Declared, InitialCovariance::Stationary] {
+        let filter = Kalman::starting(initial);
+        let found = Fit::new(&Integral, &even).parameters(start).predictor(filter).problem().unwrap();
+        let expected =
+            Fit::new(&Sampled::<true, false>, &discrete).parameters(start).predictor(filter).problem().unwrap();
+        agree(costs(found), costs(expected), 1e-11);
+    }
+    let stamps: Vec<f64> =
+        (0..300).map(|k| TS * (k as f64 + 0.3 * (k as f64 * 0.7).sin() + 4.0 * (k / 50) as f64)).collect();
+    let uneven = Experiment::new(&Integral, Time::Stamps(stamps), even.inputs().collect(), even.outputs().collect());
+    let uneven = uneven.unwrap().initial(Plant { x: fixed(0.3), z: fixed(0.0) });
+    let fit = |start| Fit::new(&Integral, &uneven).parameters(start).predictor(Kalman);
+    let stepped = |start| fit(start).integrator(Rk4 { substeps: 60 });
+    agree(costs(fit(start).problem().unwrap()), costs(stepped(start).problem().unwrap()), 1e-9);
+    let second = Fit::new(&Integral, &uneven).parameters(start).predictor(SecondOrder);
+    agree(costs(second.problem().unwrap()), costs(fit(start).problem().unwrap()), 1e-12);
+    let known = Loop { a: free(AT.a), c: fixed(0.0), ..Loop::map(AT, fixed) };
+    let estimate = fit(known).run().unwrap();
+    assert!(estimate.method.integrator.contains("exact transition"), "{estimate}");
+    let [exact, steps] = [fit(known), stepped(known)].map(|fit| fit.smoothed(&estimate, &uneven).unwrap());
+    for (exact, steps) in exact.means.iter().zip(&steps.means) {
+        assert!((exact.x - steps.x).abs() < 1e-8 && (exact.z - steps.z).abs() < 1e-8, "{exact:?} {steps:?}");
+    }
+}
+
 /// Plant and controller come back, and the simulation with them is that of the simulator.
 #[test]
 fn a_loop_with_a_digital_controller_is_fitted() {
@@ -258,7 +327,67 @@ fn rest_of_a_loop() {
     let x = ((k * k + 4.0 * k * TRUTH.c).sqrt() - k) / (2.0 * TRUTH.c);
     assert!((state.x - x).abs() < 1e-9 && (state.z - TRUTH.a / TRUTH.b * x).abs() < 1e-9, "{state:?} {x}");
     let error = fit(&record(0.8)).unwrap_err().to_string();
-    assert!(error.contains("rest") && error.contains("`x`"), "{error}");
+    assert!(
+        error.contains("rest") && error.contains("`x`") && error.contains("the first sample changes it by 0.8 V"),
+        "{error}"
+    );
+}
+
+/// Of a parameter that stands in the jump alone the gradient law has the slope per second: `dp/dt = gain (r - x) / ts e`.
+#[test]
+fn the_gradient_law_adapts_parameters_of_the_jump() {
+    let model = Sampled::<false, false>;
+    let (x, e, u, p) = (Plant { x: 0.3, z: 0.1 }, Plant { x: 0.0, z: 0.2 }, reference(0), TRUTH);
+    let now = Moment { model: &model, ts: TS, t: 0.0, x: &x, e: &e, u: &u, p: &p };
+    let gain = Loop { k: 2.0, ..Loop::map(TRUTH, |_| 0.0) };
+    let rates = greybox::online::Gradient::<_, 6> { gain }.rates(&now);
+    let Rate::Adapt(rate) = rates.k else { panic!() };
+    assert!((rate - 2.0 * (u.r - x.x) / TS * e.z).abs() < 1e-14, "{rate}");
+}
+
+/// A helper of the name of the jump is no jump of a discrete model, whose own step calls it: the equations may be affine all the same.
+#[derive(Clone)]
+struct Helped;
+
+impl Model for Helped {
+    type State = Measured;
+    type Input = Reference;
+    type Output = Measured;
+    type Parameters = Loop;
+    const KIND: Kind = Kind::Discrete;
+
+    fn jump<S: Scalar>(&self, _t: S, x: &Measured<S>, _u: &Reference<S>, _p: &Loop<S>) -> Measured<S> {
+        Measured { x: x.x * x.x }
+    }
+    fn next<S: Scalar>(&self, _t: S, x: &Measured<S>, u: &Reference<S>, p: &Loop<S>) -> Measured<S> {
+        // Not read as a graph.
+        let _ = x.x.value();
+        Measured { x: p.a * x.x + p.b * u.r }
+    }
+    fn diffusion<S: Scalar>(&self, _t: S, _x: &Measured<S>, _u: &Reference<S>, p: &Loop<S>) -> Measured<S> {
+        Measured { x: p.q }
+    }
+    fn noise<S: Scalar>(&self, _t: S, _x: &Measured<S>, _u: &Reference<S>, p: &Loop<S>) -> Measured<S> {
+        Measured { x: p.s }
+    }
+    fn output<S: Scalar>(&self, _t: S, x: &Measured<S>, _u: &Reference<S>, _p: &Loop<S>) -> Measured<S> {
+        *x
+    }
+}
+
+#[test]
+fn a_discrete_model_has_no_jump() {
+    let mut random = Noise(3);
+    let (mut x, mut outputs) = (0.0, vec![]);
+    let inputs: Vec<Reference> = (0..200).map(reference).collect();
+    for u in &inputs {
+        outputs.push(Measured { x: x + 0.05 * random.gauss() });
+        x = 0.6 * x + 0.5 * u.r + 0.1 * random.gauss();
+    }
+    let record = Experiment::new(&Helped, Time::Uniform { start: 0.0, step: TS }, inputs, outputs).unwrap();
+    let start = Loop { a: free(0.5), b: free(0.4), ..Loop::map(TRUTH, fixed) };
+    let found = Fit::new(&Helped, &record).parameters(start).predictor(Kalman).run().unwrap();
+    assert!((found.parameters.a - 0.6).abs() < 0.1 && (found.parameters.b - 0.5).abs() < 0.1, "{found}");
 }
 
 /// An observer of the loop follows it: without noise its state is the simulated one.

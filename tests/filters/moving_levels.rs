@@ -171,6 +171,13 @@ fn a_column_of_deviations_weights_the_samples() {
     let found =
         Fit::new(&model, &record).parameters(Line { a: free(1.0), r: fixed(1.0) }).predictor(Kalman).run().unwrap();
     assert!((found.parameters.a / best - 1.0).abs() < 1e-12, "{found}");
+    // Without states there is nothing that the second order adds.
+    let second = Fit::new(&model, &record)
+        .parameters(Line { a: free(1.0), r: fixed(1.0) })
+        .predictor(SecondOrder)
+        .run()
+        .unwrap();
+    assert!((second.parameters.a / best - 1.0).abs() < 1e-12, "{second}");
     let knowledge = &found.unknowns[0].knowledge;
     assert!((knowledge.standard_error().unwrap() / error - 1.0).abs() < 1e-6, "{found} {error}");
     assert!(found.severity() == Severity::Usable, "{found}");

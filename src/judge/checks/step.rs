@@ -7,7 +7,7 @@ use super::*;
 use crate::covariance::directions::{taking_part, undetermined};
 use crate::optimize::{Linearization, Outcome};
 use crate::record::{Record, Time};
-use crate::residuals::modes::{eigenvalues, some};
+use crate::residuals::modes::{StateAt, decays, some};
 
 pub(crate) const STEP: Check = Check::new(
     "a finer step changes nothing",
@@ -61,7 +61,7 @@ fn step(evidence: &Evidence<'_>, unknowns: &[Unknown]) -> Vec<Warning> {
         return step_decides_the_search(evidence).into_iter().collect();
     }
     let finer =
-        coarse.then(|| evidence.point.objective.sweep.refined(evidence.point.objective.problem.samples())).flatten();
+        coarse.then(|| evidence.point.objective.sweep.refined(evidence.point.objective.problem.all_steps())).flatten();
     let Some(finer) = finer else { return vec![] };
     let objective = evidence.point.objective.of(evidence.point.objective.problem, &*finer);
     let Some(Shift { of, errors, part }) = shift(evidence, &objective, unknowns) else {
@@ -105,7 +105,7 @@ fn diverges(evidence: &Evidence<'_>, change: f64, finer: &str) -> Vec<Warning> {
 /// Data that are reproduced to their rounding may have been made with this step. But a step with held inputs is exact for a linear
 /// plant of other parameters, too: so what a finer one changes is said.
 fn exact_with_this_step(evidence: &Evidence<'_>, unknowns: &[Unknown]) -> Option<Warning> {
-    let finer = evidence.point.objective.sweep.refined(evidence.point.objective.problem.samples())?;
+    let finer = evidence.point.objective.sweep.refined(evidence.point.objective.problem.all_steps())?;
     let objective = evidence.point.objective.of(evidence.point.objective.problem, &*finer);
     let Shift { of, part, .. } = shift(evidence, &objective, unknowns).filter(|shift| shift.part >= DIGITS)?;
     let text = format!(
@@ -127,7 +127,7 @@ fn determined_by_a_finer_step(evidence: &Evidence<'_>, unknowns: &[Unknown]) -> 
     if directions.is_empty() {
         return None;
     }
-    let finer = evidence.point.objective.sweep.refined(evidence.point.objective.problem.samples())?;
+    let finer = evidence.point.objective.sweep.refined(evidence.point.objective.problem.all_steps())?;
     let linear = evidence
         .point
         .objective
@@ -163,7 +163,7 @@ fn step_decides_the_search(evidence: &Evidence<'_>) -> Option<Warning> {
     let text = format!(
         "the step may have kept the search from a minimum: with {} the cost at its {place} is another; use a finer step, or \
          smooth the model",
-        evidence.point.objective.sweep.refined(evidence.point.objective.problem.samples())?.integrator()
+        evidence.point.objective.sweep.refined(evidence.point.objective.problem.all_steps())?.integrator()
     );
     Some(not_usable(WarningCode::CoarseStep, text).about(About::Step))
 }
@@ -230,8 +230,11 @@ fn windows_add_up(evidence: &Evidence<'_>) -> f64 {
     if objective.sweep.restarts().is_some() {
         return 1.0;
     }
-    let of = |point| eigenvalues(objective, &evidence.point.end.coordinates, point);
-    let slowest = some(&evidence.residuals.points).filter_map(of).flatten().map(|value| value.re).reduce(f64::max);
+    let of = |point: &StateAt| {
+        let record = &objective.problem.records[point.experiment];
+        decays(objective, &evidence.point.end.coordinates, point, interval(record))
+    };
+    let slowest = some(&evidence.residuals.points).filter_map(of).flatten().reduce(f64::max);
     let Some(decay) = slowest else { return 1.0 };
     let records = objective.problem.records.iter();
     records.map(|record| sum(decay * WINDOW * interval(record), record.len() as f64 / WINDOW)).fold(1.0, f64::max)

@@ -53,7 +53,7 @@ impl<M: Model, F: Fn(&Moment<M>) -> Of<M::Parameters, Rate>> AdaptationLaw<M> fo
 }
 
 /// The gradient law `dp/dt = gain (df/dp)^T e`, for any model by exact slopes; of a discrete model, `df` is what one
-/// sample adds, per second.
+/// sample adds, per second, and so is a part of it where samples change the state of a continuous one ([`Model::jump`]).
 ///
 /// Where `f` is linear in the parameters, this is the law of Lyapunov's `V = e^T e + sum of (error of p)^2 / gain`. `N`
 /// is the number of parameters.
@@ -72,8 +72,10 @@ impl<M: Model, const N: usize> AdaptationLaw<M> for Gradient<Of<M::Parameters, f
         let (x, u) = (M::State::map(*now.x, Dual::from), M::Input::map(*now.u, Dual::from));
         let (f, scale) = match M::KIND {
             Kind::Continuous => {
-                let x = now.model.jump(Dual::from(now.t), &x, &u, &p);
-                (now.model.derivative(Dual::from(now.t), &x, &u, &p), 1.0)
+                let after = now.model.jump(Dual::from(now.t), &x, &u, &p);
+                let f = now.model.derivative(Dual::from(now.t), &after, &u, &p);
+                let (f, after) = (M::State::into_array(f), M::State::into_array(after));
+                (M::State::from_fn(|i| f.as_ref()[i] + after.as_ref()[i] * now.ts.recip()), 1.0)
             }
             Kind::Discrete => (now.model.next(Dual::from(now.t), &x, &u, &p), 1.0 / now.ts),
             Kind::Static => (x, 0.0),

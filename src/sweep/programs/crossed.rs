@@ -85,10 +85,9 @@ impl Crossed {
         let numbers = |length: f64| self.linear.numbers(&known.parameters, length);
         let crossing = |numbers: Vec<f64>| self.linear.crossing(|following| numbers[following.number as usize]);
         let (band, [begin, _]) = (Band::new(number, numbers), Band::bounds(number));
-        let exact = numbers(begin);
-        // What overflows at the begin does so in the whole band.
-        let is_near = exact.iter().any(|number| !number.is_finite())
-            || crossing(band.numbers(begin)).is_near(&crossing(exact), NEAR);
+        let exact = crossing(numbers(begin));
+        // What overflows at the begin does so in the whole band. A slope may be infinite alone: at a level of zero of a root.
+        let is_near = !exact.is_finite() || crossing(band.numbers(begin)).is_near(&exact, NEAR);
         let band = is_near.then(|| Arc::new(band));
         lock(&known.bands).insert(number, band.clone());
         band
@@ -114,11 +113,14 @@ struct Lane<'r> {
 
 impl<'r> Crossing<'r> {
     pub fn new(crossed: &'r Crossed, pieces: &[&Piece<'r>]) -> Self {
-        let lane = |piece: &&Piece<'r>| {
-            let (known, lengths) = (crossed.known(piece.parameters), piece.prepared.lengths(piece.record));
-            Lane { known, lengths, length: None }
-        };
-        Crossing { crossed, lanes: pieces.iter().map(lane).collect() }
+        let mut lanes: Vec<Lane<'r>> = Vec::with_capacity(pieces.len());
+        for piece in pieces {
+            // Lanes without a piece repeat the first.
+            let same = lanes.iter().find(|lane| lane.known.parameters == piece.parameters);
+            let known = same.map_or_else(|| crossed.known(piece.parameters), |lane| lane.known.clone());
+            lanes.push(Lane { known, lengths: piece.prepared.lengths(piece.record), length: None });
+        }
+        Crossing { crossed, lanes }
     }
 
     /// Gives each lane the numbers of the interval that begins so many samples after the first of its piece.
