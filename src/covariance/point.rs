@@ -67,10 +67,12 @@ impl<'p> Point<'p> {
         };
         let residual = linear.sum_of_squares().sqrt();
         let (starts, logarithms) = (unknowns.start(), objective.logarithms());
-        let negligible =
+        let slopes_vanish =
             |i: usize| logarithms[i] && coordinates[i] < starts[i] && is_negligible(norms[i], gradient[i], residual);
-        let held_at: Vec<Option<f64>> = (0..n).map(|i| at_bound(i).or(negligible(i).then_some(0.0))).collect();
-        let flat = |i: usize| norms[i] == 0.0 || negligible(i) && !is_proportional(objective, coordinates, linear, i);
+        let negligible: Vec<bool> =
+            (0..n).map(|i| slopes_vanish(i) && vanishes(objective, coordinates, linear, i)).collect();
+        let held_at: Vec<Option<f64>> = (0..n).map(|i| at_bound(i).or(negligible[i].then_some(0.0))).collect();
+        let flat = |i: usize| norms[i] == 0.0 || negligible[i] && !is_proportional(objective, coordinates, linear, i);
         let at_bounds: Vec<bool> = held_at.iter().map(Option::is_some).collect();
         let undetermined = directions::undetermined(linear, &at_bounds);
         let values = unknowns.values(coordinates);
@@ -122,6 +124,18 @@ impl<'p> Point<'p> {
     pub fn is_exact(&self) -> bool {
         self.end.outcome == Outcome::Exact
     }
+}
+
+/// A cost that rises by less, in halves of the mean square of an error, does not rise.
+const LEVEL: f64 = 0.01;
+
+/// Whether the cost does not rise when a quantity is divided by `e`: where slopes are zero at a stationary value, such as at the eigenvalue where a step of
+/// Runge-Kutta's method damps the most, it does.
+fn vanishes(objective: &Objective<'_>, coordinates: &[f64], linear: &Linearization, i: usize) -> bool {
+    let mut smaller = coordinates.to_vec();
+    smaller[i] -= 1.0;
+    let costs = objective.cost_at(coordinates).ok().zip(objective.cost_at(&smaller).ok());
+    costs.is_some_and(|(here, there)| there - here <= LEVEL * linear.sum_of_squares() / linear.rows().max(1) as f64)
 }
 
 /// Whether the cost rises as the slopes of a logarithm say when its quantity grows from next to zero until it changes the errors by one

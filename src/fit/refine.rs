@@ -19,6 +19,9 @@ pub(super) const CERTAINLY_WORSE: f64 = 15.0;
 /// apart.
 const MOVED: f64 = 1.0;
 
+/// One that a finer step moved by less is not moved by it.
+const UNMOVED: f64 = 0.1;
+
 /// Minima whose deviances differ by less for each measurement, half a percent of the errors, are alike. The errors of an output that is left
 /// unexplained are about as large as the output; if the step were the reason, one four times as fine would change them by far more.
 const ALIKE: f64 = 0.01;
@@ -163,6 +166,7 @@ impl Attempt {
             let values = before.unknowns.iter().map(|unknown| unknown.value).collect();
             coarser.push(Coarser { deviance, integrator: before.method.integrator.clone(), values });
         }
+        let again = if moves_nothing(&before, &again) { without_step(again) } else { again };
         Attempt { found: Ok(after(&before, again)), coarser }
     }
 
@@ -182,6 +186,22 @@ impl Attempt {
         found.warnings.extend(warning);
         Ok(found)
     }
+}
+
+/// Whether a search with a finer step has left all unknowns where those of the coarser one were, by its standard errors.
+fn moves_nothing(before: &Summary, again: &Summary) -> bool {
+    let converged = [before, again].iter().all(|found| found.outcome.converged());
+    let known = again.unknowns.iter().all(|unknown| unknown.knowledge.standard_error().is_some());
+    let values = before.unknowns.iter().map(|unknown| unknown.value);
+    converged && known && farthest(again, values).is_some_and(|(_, errors)| errors <= UNMOVED)
+}
+
+/// An estimate without warnings of what a still finer step would move: that is found from slopes, which say too much where a short change of the unknowns
+/// leads to another trajectory. Not where the simulation with a finer step fails.
+fn without_step(found: Summary) -> Summary {
+    let fails = found.warnings.iter().any(|warning| warning.code == WarningCode::NotAtMinimum);
+    let kept = |warning: &Warning| fails || warning.about != About::Step;
+    Summary { warnings: found.warnings.into_iter().filter(kept).collect(), ..found }
 }
 
 /// The start of the problem, with so many trial steps; `None` where the step of its method decides the cost.

@@ -152,8 +152,8 @@ impl Outcome {
                  switch)."
             }
             Outcome::Stalled { failed: 0, .. } => {
-                "The cost is not smooth here (dry friction, a switch, a coarse tolerance): smooth the model, use a shorter \
-                 horizon, or start elsewhere."
+                "The cost is not smooth here (dry friction, a switch, the dead time of a held input, a coarse tolerance): \
+                 smooth the model, use a shorter horizon, or start elsewhere."
             }
             Outcome::Stalled { .. } => {
                 "The simulation fails all around this point: bound the parameters, use a shorter horizon or start elsewhere."

@@ -216,3 +216,19 @@ fn an_adaptive_method_that_is_no_finer() {
     let lost = Summary { outcome: Outcome::TimeLimit, ..of("steps", 3, care) };
     assert_eq!(taken(lost, of("adaptive", 4, care), true), "adaptive");
 }
+
+/// What slopes say of a still finer step does not count where the finer one has left the unknown within a tenth of a standard error; it does where the
+/// unknown has moved, and where the simulation with a finer step fails.
+#[test]
+fn a_search_with_a_finer_step_tells_more_than_slopes() {
+    let coarse = || Warning::new(WarningCode::CoarseStep, Severity::NotUsable, String::new()).about(About::Step);
+    let fails = || Warning::new(WarningCode::NotAtMinimum, Severity::NotUsable, String::new()).about(About::Search);
+    let left = |value: f64, converged: bool, further: Option<Warning>| {
+        let warned = |found: Summary, all: Vec<Warning>| Summary { warnings: all, ..found };
+        let before = warned(answer("first", 10.0, 1.0, converged), vec![coarse()]);
+        let again = warned(answer("second", 10.0, value, true), further.into_iter().chain([coarse()]).collect());
+        Attempt::new(Ok(before)).or(Ok(again), false).is_coarse()
+    };
+    assert!(!left(1.05, true, None));
+    assert!(left(1.2, true, None) && left(1.05, false, None) && left(1.05, true, Some(fails())));
+}

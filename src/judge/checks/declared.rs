@@ -2,13 +2,15 @@
 
 use super::*;
 use crate::estimate::Direction;
+use crate::interval::Hold;
 use crate::judge::checks::conditions;
 use crate::layout::Kind;
 use crate::parameter::Transform;
+use crate::record::Holds;
 
 pub(crate) const GAPS: Check = Check::new(
     "time has no gaps",
-    "Does time jump within a record whose inputs are held meanwhile?",
+    "Does time jump within a record with inputs, which are not known meanwhile?",
     &[WarningCode::TimeGaps],
     |evidence, _| gaps(evidence).into(),
 );
@@ -147,8 +149,13 @@ fn gaps(evidence: &Evidence<'_>) -> Vec<Warning> {
     let gaps = |(e, (record, label)): (usize, (&crate::record::Record, &String))| {
         let gaps = record.gaps();
         let (count, first) = (counted(gaps.len() as u64, "gap"), gaps.first()?);
+        let meanwhile = match &record.holds {
+            Holds::All(Hold::Zero) => "held",
+            Holds::All(Hold::First) => "a straight line",
+            Holds::Each(_) => "held, or as a straight line,",
+        };
         let text = format!(
-            "time jumps in experiment `{label}` ({count}, the first: {first}): the input is taken as held meanwhile, \
+            "time jumps in experiment `{label}` ({count}, the first: {first}): the input is taken as {meanwhile} meanwhile, \
              which is seldom what happened; fit the pieces between (Experiment::without_gaps)"
         );
         Some(with_care(WarningCode::TimeGaps, text).about(About::Experiment(e)))

@@ -37,8 +37,10 @@ fn simulates(evidence: &Evidence<'_>, _intervals: &Intervals) -> Examined {
             let worst = worst.max_by(|a, b| a.1.total_cmp(&b.1)).filter(|(_, times)| *times > WORSE);
             worst.map(|(j, _)| {
                 let off = |error: f64| format!("{}{}", number(error, 3), unit_after(&outputs[j].unit));
+                // Outputs are taken in one after the other.
+                let before = if j > 0 { " and from the outputs before it" } else { "" };
                 format!(
-                    "predicted one sample ahead, `{}` is off by {} (rms); simulated from the first sample with these parameters, by {}: {serves}",
+                    "predicted one sample ahead{before}, `{}` is off by {} (rms); simulated from the first sample with these parameters, by {}: {serves}",
                     outputs[j].name,
                     off(evidence.residuals.outputs[j].rmse),
                     off(simulated[j])
