@@ -106,7 +106,15 @@ impl Further {
                 ),
             ),
         };
-        best.warnings.push(Warning::new(WarningCode::Unexplained, Severity::Usable, text).about(About::Search));
+        let colored = best.warnings.iter().any(|warning| warning.code == WarningCode::ColoredErrors);
+        let (severity, local) = match colored {
+            true => (
+                Severity::UsableWithCare,
+                "; the errors are colored, as those of a local minimum are: a lower one may lie elsewhere",
+            ),
+            false => (Severity::Usable, ""),
+        };
+        best.warnings.push(Warning::new(WarningCode::Unexplained, severity, text + local).about(About::Search));
         best
     }
 }

@@ -135,8 +135,10 @@ fn advance<O: Order, S: Scalar>(plant: &dyn Plant<S>, carry: &mut [S]) -> Result
 /// The matrix `F` with which the covariance of this state and the next is `P F'`: the product of the means of the slopes on the way.
 pub(crate) fn transition<O: Order>(plant: &dyn Plant<f64>, carry: &[f64]) -> Result<Vec<f64>, Stuck> {
     let (n, carried) = (plant.layout().states.len(), carry.len());
-    if plant.layout().kind == Kind::Discrete {
-        return Ok(O::state(plant, 0.0, carry).slopes);
+    match plant.layout().kind {
+        Kind::Continuous => {}
+        Kind::Discrete => return Ok(O::state(plant, 0.0, carry).slopes),
+        Kind::Static => return Ok(vec![]),
     }
     let mut z = carry.to_vec();
     let mut begin = identity(n);

@@ -24,7 +24,7 @@ pub(crate) fn some(points: &[StateAt]) -> impl Iterator<Item = &StateAt> {
 /// The eigenvalues of the state's Jacobian at a point (1/s).
 pub(crate) fn eigenvalues(objective: &Objective<'_>, coordinates: &[f64], at: &StateAt) -> Option<Vec<Complex<f64>>> {
     let n = at.state.len();
-    slopes(objective, coordinates, at, &|record, p| objective.sweep.state_slopes(record, at.sample, &at.state, p))
+    slopes(objective, coordinates, at, |record, p| objective.sweep.state_slopes(record, at.sample, &at.state, p))
         .and_then(|slopes| eigenvalues_of(n, &slopes))
 }
 
@@ -32,11 +32,11 @@ pub(crate) fn eigenvalues(objective: &Objective<'_>, coordinates: &[f64], at: &S
 pub(crate) fn decays(objective: &Objective<'_>, coordinates: &[f64], at: &StateAt, interval: f64) -> Option<Vec<f64>> {
     let n = at.state.len();
     let jump = |record: &Record, p: &[f64]| objective.sweep.jump_slopes(record, at.sample, &at.state, p);
-    let Some(jump) = slopes(objective, coordinates, at, &jump) else {
+    let Some(jump) = slopes(objective, coordinates, at, jump) else {
         return Some(eigenvalues(objective, coordinates, at)?.iter().map(|value| value.re).collect());
     };
     let state = |record: &Record, p: &[f64]| objective.sweep.state_slopes(record, at.sample, &at.state, p);
-    let a = slopes(objective, coordinates, at, &state)?;
+    let a = slopes(objective, coordinates, at, state)?;
     let step = Transition::over(n, &a, &vec![0.0; n * n], interval).after(&jump).kept();
     Some(eigenvalues_of(n, &step)?.iter().map(|value| value.norm().ln() / interval).collect())
 }
@@ -46,7 +46,7 @@ fn slopes(
     objective: &Objective<'_>,
     coordinates: &[f64],
     at: &StateAt,
-    of: &dyn Fn(&Record, &[f64]) -> Option<Vec<f64>>,
+    of: impl Fn(&Record, &[f64]) -> Option<Vec<f64>>,
 ) -> Option<Vec<f64>> {
     let parameters = objective.problem.unknowns.of_experiment(at.experiment, coordinates).p;
     let slopes = of(&objective.problem.records[at.experiment], &parameters)?;
