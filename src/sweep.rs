@@ -320,7 +320,7 @@ pub trait Sweep: Send + Sync {
         None
     }
 
-    /// The states of a record by a Kalman filter, from the carry at the first sample: after each sample's measurements, or `smoothed` by all of
+    /// The states of a record by a filter of process noise, from the carry at the first sample: after each sample's measurements, or `smoothed` by all of
     /// them; `None` of other predictors. The error is the sample that could not be reached or predicted.
     fn states(
         &self,

@@ -53,17 +53,18 @@ impl<M: Model> Fit<'_, M> {
         Ok(typed(found, record))
     }
 
-    /// The state after each sample's measurements, by a Kalman filter with the parameters of an estimate, on a record of the fit or a new
+    /// The state after each sample's measurements, by the filter of this fit with the parameters of an estimate, on a record of the fit or a new
     /// one; as [`predict`](Fit::predict) otherwise.
     ///
     /// # Errors
-    /// As [`predict`](Fit::predict); a predictor other than [`Kalman`](crate::Kalman).
+    /// As [`predict`](Fit::predict); a predictor other than [`Kalman`](crate::Kalman) and [`SecondOrder`](crate::SecondOrder).
     pub fn filtered(&self, estimate: &Estimate<M>, record: &ExperimentOf<M>) -> Result<StatesOf<M>, Error> {
         self.states(estimate, record, false)
     }
 
     /// The state at each sample by all measurements of the record, before it and after it: the mean and covariance of what is known of it in the
-    /// end (fixed-interval smoother of Rauch, Tung and Striebel, AIAA Journal 3 (1965) 1445-1450, extended where the model is not affine).
+    /// end (fixed-interval smoother of Rauch, Tung and Striebel, AIAA Journal 3 (1965) 1445-1450, by the model's slopes where it is not affine, to the second order by
+    /// their means).
     /// The parameters and an initial state that is estimated count as known.
     ///
     /// # Errors

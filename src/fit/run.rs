@@ -228,11 +228,11 @@ impl Problem<'_> {
         asked(problem.sweep.clone(), record, estimate, |objective, at| objective.predict(0, at))
     }
 
-    /// The state of a record after each sample's measurements, by the Kalman filter of this problem with the parameters of an estimate, as
+    /// The state of a record after each sample's measurements, by the filter of this problem with the parameters of an estimate, as
     /// [`Fit::filtered`](crate::Fit::filtered).
     ///
     /// # Errors
-    /// As [`predict`](Self::predict); a predictor other than [`Kalman`](crate::Kalman).
+    /// As [`predict`](Self::predict); a predictor other than [`Kalman`](crate::Kalman) and [`SecondOrder`](crate::SecondOrder).
     pub fn filtered(&self, estimate: &Summary, record: &Record) -> Result<States, Error> {
         let problem = self.by_number(estimate.method.refinement);
         asked(problem.sweep.clone(), record, estimate, |objective, at| objective.states(0, at, false))
