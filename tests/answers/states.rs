@@ -1,6 +1,7 @@
 //! The states of a filter in a report.
 
 use crate::random::Random;
+use greybox::predict::{Plant, Predictor};
 use greybox::{
     Experiment, ExperimentOf, Fit, Kalman, Model, Parameter, Problem, Report, Scalar, SecondOrder, Signals, Summary,
     Time, fixed, free, signals,
@@ -162,22 +163,41 @@ fn a_band_of_a_state_has_room() {
     assert_eq!(count, 2);
 }
 
-/// A filter that is not asked for its states says why they are missing; a simulation has none, and says nothing.
+/// A simulation whose errors have a known variance.
+#[derive(Clone, Debug)]
+struct OfKnownVariance;
+
+impl Predictor for OfKnownVariance {
+    fn predicts_variance(&self) -> bool {
+        true
+    }
+    fn predict<S: Scalar>(&self, plant: &dyn Plant<S>, carry: &[S], output: usize) -> (S, S) {
+        let mut y = vec![S::from(0.0); plant.layout().outputs.len()];
+        plant.output(&carry[..plant.layout().states.len()], &mut y);
+        (y[output], S::from(4.0))
+    }
+    fn describe(&self) -> String {
+        "simulation of known variance".to_owned()
+    }
+}
+
+/// A filter of second order has its states, too; a predictor that is no filter says why they are missing; a simulation has none, and says nothing.
 #[test]
 fn states_that_are_not_known() {
     let record = house(200, 7);
-    let said = |second: bool| {
-        let fit = Fit::new(&Heated, &record).parameters(start());
-        let problem = if second { fit.predictor(SecondOrder).problem() } else { fit.problem() }.unwrap();
+    let fit = |start| Fit::new(&Heated, &record).parameters(start);
+    let said = |problem: Problem<'_>| {
         let report = Report::new(&problem, &problem.run().unwrap()).unwrap();
-        report.sections.iter().find(|section| section.id == "states-1").map(|section| section.sentences.join(" "))
+        let section = report.sections.into_iter().find(|section| section.id == "states-1")?;
+        Some((section.sentences.join(" "), section.plots.len()))
     };
-    let second = said(true).expect("a section");
-    assert!(
-        second.starts_with("The states are not shown: states are filtered") && second.contains("second order"),
-        "{second}"
-    );
-    assert_eq!(said(false), None);
+    let second = said(fit(start()).predictor(SecondOrder).problem().unwrap()).expect("a section");
+    assert!(second.0.starts_with("The smoothed state is estimated") && second.1 == 1, "{second:?}");
+    let known = House { ca: free(2.0), ..House::map(TRUTH, fixed) };
+    let other = said(fit(known).predictor(OfKnownVariance).problem().unwrap()).expect("a section");
+    let why = "The states are not shown: states are filtered";
+    assert!(other.0.starts_with(why) && other.0.contains("this is simulation of known variance"), "{other:?}");
+    assert_eq!(said(fit(start()).problem().unwrap()), None);
 }
 
 /// Of several records, each has its states, closed where the record is.
