@@ -107,7 +107,7 @@ impl<S: Scalar> Transition<S> {
             let kept = |i: usize, j: usize| self.added[i * n + j].value() + f64::from(u8::from(i == j));
             let largest = (0..n * n).map(|at| (kept(at / n, at % n) * kept(at % n, at / n)).abs());
             let largest = largest.fold(0.0, f64::max);
-            // A chain that passes values on is empty after as many intervals as it has states, and shows nothing before.
+            // A nilpotent part vanishes after at most `n` intervals; its products are zero from the first one on.
             if largest <= REST && 1 << doublings >= n {
                 // Slopes decay as the transition does, times the number of intervals.
                 (0..2).for_each(|_| self.double());

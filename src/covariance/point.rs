@@ -126,11 +126,11 @@ impl<'p> Point<'p> {
     }
 }
 
-/// A cost that rises by less, in halves of the mean square of an error, does not rise.
+/// A rise of the cost by less than this part of the mean square of an error is none: it changes no estimate by a tenth of its standard error.
 const LEVEL: f64 = 0.01;
 
-/// Whether the cost does not rise when a quantity is divided by `e`: where slopes are zero at a stationary value, such as at the eigenvalue where a step of
-/// Runge-Kutta's method damps the most, it does.
+/// Whether the cost does not rise when a quantity is divided by `e`, as where its influence falls towards zero. It rises where the slope is zero at a
+/// minimum of the predictions, such as at the decay for which one step of Runge-Kutta's method damps the most.
 fn vanishes(objective: &Objective<'_>, coordinates: &[f64], linear: &Linearization, i: usize) -> bool {
     let mut smaller = coordinates.to_vec();
     smaller[i] -= 1.0;

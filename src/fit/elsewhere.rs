@@ -341,6 +341,23 @@ mod tests {
         assert!(!is_found(&unusable(-100.0), &unusable(0.0)));
     }
 
+    /// What further searches found is with care where its errors are colored, and as usable as it was where they are not.
+    #[test]
+    fn colored_errors_after_further_searches_are_with_care() {
+        let inputs: Vec<Voltage> = (0..40).map(|k| Voltage { u: f64::from(k * 37 % 21) - 10.0 }).collect();
+        let noise = |k: usize| f64::from(k as u32 * 11 % 17) / 17.0 - 0.5;
+        let outputs = inputs.iter().enumerate().map(|(k, u)| Current { i: 2.0 * u.u + noise(k) }).collect();
+        let record = Experiment::new(&Line, Time::Uniform { start: 0.0, step: 1.0 }, inputs, outputs).unwrap();
+        let found = Fit::new(&Line, &record).parameters(Gain { a: free(1.0) }).run().unwrap().summary().clone();
+        let colored = Warning::new(WarningCode::ColoredErrors, Severity::Usable, String::new()).about(About::Output(0));
+        let severity = |warnings: Vec<Warning>| {
+            let best = Box::new(Summary { warnings, ..found.clone() });
+            let further = Further::Found { best, way: Way::Starts, stopped: false, time: Duration::ZERO };
+            further.or(&found).severity()
+        };
+        assert_eq!([severity(vec![]), severity(vec![colored])], [Severity::Usable, Severity::UsableWithCare]);
+    }
+
     /// At least 100 steps, three times 50 or 60, as far as 200 leave them: 150 after 50, 140 after 60, none after 200.
     #[test]
     fn further_searches_have_what_is_left() {

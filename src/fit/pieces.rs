@@ -36,7 +36,7 @@ impl Problem<'_> {
             .row
             .iter()
             .any(|unknown| matches!(unknown.role, Role::Parameter(_)) && unknown.experiment.is_some());
-        // The late inputs of a piece begin before it.
+        // A late input takes values from before the piece, which a slice of the record does not have.
         let parameters: Vec<f64> = self.unknowns.parameters.iter().map(|parameter| parameter.start).collect();
         if self.sweep.is_late(&parameters) {
             return None;

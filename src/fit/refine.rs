@@ -19,7 +19,7 @@ pub(super) const CERTAINLY_WORSE: f64 = 15.0;
 /// apart.
 const MOVED: f64 = 1.0;
 
-/// One that a finer step moved by less is not moved by it.
+/// A search with a finer step that moves an unknown by fewer standard errors counts as leaving it where it is.
 const UNMOVED: f64 = 0.1;
 
 /// Minima whose deviances differ by less for each measurement, half a percent of the errors, are alike. The errors of an output that is left
@@ -196,8 +196,8 @@ fn moves_nothing(before: &Summary, again: &Summary) -> bool {
     converged && known && farthest(again, values).is_some_and(|(_, errors)| errors <= UNMOVED)
 }
 
-/// An estimate without warnings of what a still finer step would move: that is found from slopes, which say too much where a short change of the unknowns
-/// leads to another trajectory. Not where the simulation with a finer step fails.
+/// An estimate without the warnings about still finer steps, whose moves are found by one step along the slopes: that is too long where the trajectory
+/// depends strongly on the unknowns. The warnings stay where the simulation with a finer step fails.
 fn without_step(found: Summary) -> Summary {
     let fails = found.warnings.iter().any(|warning| warning.code == WarningCode::NotAtMinimum);
     let kept = |warning: &Warning| fails || warning.about != About::Step;

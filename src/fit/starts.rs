@@ -163,7 +163,7 @@ impl<'p> Run<'p> {
         Run::at(search.tell(answer), plain, comparison)
     }
 
-    /// Passes on second derivatives.
+    /// Passes on the second derivatives that it requested.
     fn bent(self, answer: Option<Answer>, plain: &Objective<'_>, comparison: &Comparison) -> Run<'p> {
         match self {
             Run::Searching(search) => Run::at(search.bend(answer), plain, comparison),

@@ -132,7 +132,8 @@ fn advance<O: Order, S: Scalar>(plant: &dyn Plant<S>, carry: &mut [S]) -> Result
     })
 }
 
-/// The matrix `F` with which the covariance of this state and the next is `P F'`: the product of the means of the slopes on the way.
+/// The matrix `F` with which the covariance of this state and the next is `P F'`: `dF/dt = A F` with the mean slopes `A`, from those of the jump on; row by
+/// row.
 pub(crate) fn transition<O: Order>(plant: &dyn Plant<f64>, carry: &[f64]) -> Result<Vec<f64>, Stuck> {
     let (n, carried) = (plant.layout().states.len(), carry.len());
     match plant.layout().kind {

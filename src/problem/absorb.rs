@@ -60,8 +60,8 @@ impl<'o> Absorber<'o> {
         self.absorb_rows(window.lanes(), window.width, window.rows_mut(), count);
     }
 
-    /// Absorbs a window whose errors `replace` exchanges for other numbers, by numbers `beside` them, row by row and lane by lane. Weights are those of the
-    /// errors.
+    /// Absorbs a window in which `replace` overwrites the errors; it is given the numbers `beside`, one for each error, row by row and lane by lane. Rows and
+    /// these numbers are weighted as the errors are.
     pub fn absorb_instead(
         &mut self,
         window: &mut Window,
@@ -103,7 +103,7 @@ impl<'o> Absorber<'o> {
         }
     }
 
-    /// Multiplies rows by the roots of their weights, and what is beside their errors, if anything is.
+    /// Multiplies rows by the roots of their weights, and the numbers `beside`, one for each error or none at all.
     fn weigh(&mut self, window: &mut Window, beside: &mut [f64]) {
         let (lanes, last) = (window.lanes(), window.columns() - 1);
         let outputs = window.outputs();

@@ -90,7 +90,7 @@ impl<'a> Problem<'a> {
         self.method.checked_sub(1).and_then(|number| SUBSTEPS.get(number)).map_or(1, |steps| *steps as usize)
     }
 
-    /// Those of all samples: what a program is worth its compilation by.
+    /// Steps of all samples; with many, compiling a program pays.
     pub(crate) fn all_steps(&self) -> usize {
         self.samples() * self.steps()
     }

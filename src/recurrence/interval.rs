@@ -121,7 +121,7 @@ impl<'a> SymbolicInterval<'a> {
         self.flow(x);
     }
 
-    /// The state at the next sample, of that after this one.
+    /// The state at the next sample, from the state after the jump at this one.
     pub fn flow(&self, x: &mut [Symbol]) {
         if let Some(crossing) = self.crossing() {
             return crossing.state(x, !self.holds.all_zero(), |position, x, to| self.rate(position, x, to));

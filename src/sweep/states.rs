@@ -90,7 +90,8 @@ impl Filter<'_> {
                 steps.correct(&plant, &mut carry, j, error);
             }
             let (after, last) = (carry.clone(), k + 1 == record.len());
-            // To the second order the mean depends on the covariance, too. Linear equations that are crossed exactly have no curvature.
+            // To the second order the next mean depends on the covariance, too, so that its derivative is not the product of the mean slopes. Equations
+            // that are crossed exactly are affine, where the two are the same.
             let of_means = self.predictor.is_second_order() && !self.method.is_exact();
             let slopes = match smoothed && !last {
                 true if of_means => transition::<SecondOrder>(&plant, &carry),

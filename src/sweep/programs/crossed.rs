@@ -86,7 +86,7 @@ impl Crossed {
         let crossing = |numbers: Vec<f64>| self.linear.crossing(|following| numbers[following.number as usize]);
         let (band, [begin, _]) = (Band::new(number, numbers), Band::bounds(number));
         let exact = crossing(numbers(begin));
-        // What overflows at the begin does so in the whole band. A slope may be infinite alone: at a level of zero of a root.
+        // What overflows at the begin does so in the whole band. Slopes are not asked: that of a square root at zero is infinite.
         let is_near = !exact.is_finite() || crossing(band.numbers(begin)).is_near(&exact, NEAR);
         let band = is_near.then(|| Arc::new(band));
         lock(&known.bands).insert(number, band.clone());

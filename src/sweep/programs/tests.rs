@@ -134,8 +134,8 @@ fn compare(model: &Pendulum, predictor: impl Predictor, uniform: bool, hold: Hol
                     }
                 };
                 pairs(&carry, &other.carry, 1e-12);
-                // Those of the covariance at rest are some hundred roundings of numbers up to ten, in a plant that forgets a tenth of
-                // its motion per radian; that of angle and speed is zero, its slopes are rounding alone.
+                // Those of the covariance at rest are some hundred roundings of numbers up to ten, in a plant whose motion
+                // decays by a tenth per radian; that of angle and speed is zero, its slopes are rounding alone.
                 pairs(&all, &other.slopes, 1e-11);
             }
             let column = |seed: &Seed| match *seed {
