@@ -18,7 +18,7 @@ pub use levenberg_marquardt::LevenbergMarquardt;
 pub use linearization::Linearization;
 pub use machine::{Domain, Machine, Request};
 pub use outcome::{Outcome, SearchLimit};
-pub(crate) use point::{is_negligible, within_tolerance};
+pub(crate) use point::{is_negligible, limit_of_precision, within_tolerance};
 
 use crate::error::Error;
 use serde::{Deserialize, Serialize};

@@ -26,6 +26,9 @@ const UNMOVED: f64 = 0.1;
 /// unexplained are about as large as the output; if the step were the reason, one four times as fine would change them by far more.
 const ALIKE: f64 = 0.01;
 
+/// So many times as many parts has a search that explains the outputs and converges slowly: what it has found is close to a minimum.
+const EXPLAINED: u64 = 2;
+
 /// A part of a search that lowers the deviance by less makes no progress.
 const LOWERED: f64 = 1.0;
 
@@ -297,7 +300,7 @@ fn may_go_on(found: &Summary, before: Option<f64>, (parts, most): (u64, u64)) ->
     limited
         && match is_useless(found, WarningCode::Unexplained) {
             true => lowers && parts < most,
-            false => lowers || parts < PARTS,
+            false => lowers || parts < EXPLAINED * PARTS,
         }
 }
 

@@ -1,9 +1,10 @@
 //! The search: rounds of an optimizer, with the noise estimated between them.
 
+use super::kink::at_kink;
 use super::start_error::start_error;
 use crate::covariance::SearchEnd;
 use crate::error::Error;
-use crate::optimize::{Domain, Infeasible, LeastSquares, Outcome, SearchLimit, within_tolerance};
+use crate::optimize::{Domain, Infeasible, LeastSquares, Outcome, SearchLimit, limit_of_precision, within_tolerance};
 use crate::problem::{
     CheckpointFile, Fingerprint, Memory, Objective, Optimizer, Round, RoundError, SearchPlan, Whitening, noise,
 };
@@ -255,19 +256,32 @@ fn first_whitening(plain: &Objective<'_>, start: &[f64]) -> Result<Whitening, Er
     noise::first_whitening(plain, start).map_err(|error| start_error(plain, start, error))
 }
 
-/// A round that found no further step has ended at a minimum all the same where the model reproduces the data, or to the tolerance of an
-/// adaptive integrator.
+/// A round that found no further step has ended at a minimum all the same where the model reproduces the data, to the tolerance of an
+/// adaptive integrator, or at a kink of the cost.
 pub(super) fn ended(objective: &Objective<'_>, mut round: Round) -> Round {
     let lost = matches!(round.outcome, Outcome::Stalled { .. } | Outcome::LimitOfPrecision { .. });
     if lost && noise::reproduces(objective, &round.coordinates) {
         round.outcome = Outcome::Exact;
+    }
+    // A filter that takes a measurement for exact has errors below the rounding of its unknowns, in units of their deviations, whatever the others are.
+    if round.outcome == Outcome::Exact
+        && objective.sweep.predicts_variance()
+        && !noise::reproduces(objective, &round.coordinates)
+    {
+        let linear = round.linear.clone();
+        let limit = linear.and_then(|linear| limit_of_precision(&round.coordinates, linear, &Domain::of(objective)));
+        round.outcome = limit.unwrap_or(Outcome::Stalled { gradient: 0.0, step: 0.0, failed: 0 });
     }
     if matches!(round.outcome, Outcome::Stalled { .. } | Outcome::Creeping { .. })
         && let Some(rough) = within_finer_tolerance(objective, &round.coordinates)
     {
         round.outcome = rough;
     }
-    round
+    let lost = matches!(round.outcome, Outcome::Stalled { .. } | Outcome::Creeping { .. } | Outcome::Rough { .. });
+    match lost && !round.outcome.converged() {
+        true => at_kink(objective, &round).unwrap_or(round),
+        false => round,
+    }
 }
 
 /// How a search ended that found no step to lower the cost of an adaptive integrator, whose number of steps changes from point

@@ -231,6 +231,12 @@ impl Point {
     }
 }
 
+/// The outcome of a search that stopped at a point where the cost resolves no further step.
+pub(crate) fn limit_of_precision(x: &[f64], linear: Linearization, domain: &Domain) -> Option<Outcome> {
+    let point = Point::new(x.to_vec(), linear, domain, &Seen::default())?;
+    Some(Outcome::LimitOfPrecision { gradient: point.cosine(), step: point.relative_step() })
+}
+
 /// The outcome of a search that stopped at a point because no step lowers its cost, from cost and slopes there:
 /// [`Outcome::Rough`] if the full step is negligible, or would lower the cost by less than `noise` at the
 /// point it leads to; else `None`.

@@ -84,6 +84,7 @@ impl Search for GaussNewton {
 }
 
 /// How one round of a search ended.
+#[derive(Clone)]
 pub(crate) struct Round {
     pub coordinates: Vec<f64>,
     pub linear: Option<Linearization>,

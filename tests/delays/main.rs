@@ -6,6 +6,7 @@ mod common;
 mod engines;
 mod field;
 mod forms;
+mod kinks;
 mod left_out;
 mod own_code;
 mod text;
@@ -50,7 +51,8 @@ fn record() -> ExperimentOf<Heated> {
     Experiment::from_file(&Heated, path).unwrap().initial(Excess { z: fixed(0.0) })
 }
 
-/// A start before zero names the input and the remedy; a dead time longer than the record, of an input that moves, has no influence.
+/// A start before zero names the input and the remedy; a dead time longer than the record, of an input that moves, has no influence, and further
+/// starts lead to the right one.
 #[test]
 fn dead_times_that_cannot_be() {
     let inputs: Vec<Valve> = (0..50).map(|k| Valve { u: f64::from(u8::from(k >= 5)) }).collect();
@@ -60,13 +62,16 @@ fn dead_times_that_cannot_be() {
     let record = run.with_noise(Sensor { y: 0.01 }, 1).experiment(&Heated).unwrap().initial(Excess { z: fixed(0.0) });
     let fitted = |theta: Parameter| {
         let parameters = Process { y0: free(1.0), k: fixed(2.0), tau: fixed(5.0), theta };
-        Fit::new(&Heated, &record).parameters(parameters).run()
+        Fit::new(&Heated, &record).parameters(parameters)
     };
-    let error = fitted(free(-1.0)).unwrap_err().to_string();
+    let error = fitted(free(-1.0)).run().unwrap_err().to_string();
     assert!(error.contains("the dead time of input `u` is -1") && error.contains(".within(0.0, ..)"), "{error}");
     let error = simulate(&Heated, &Process { theta: -1.0, ..truth }, &Excess { z: 0.0 }, time, &inputs).unwrap_err();
     assert!(error.to_string().contains("the dead time of input `u` is -1"), "{error}");
-    let estimate = fitted(free(60.0)).unwrap();
+    let estimate = fitted(free(60.0)).starts(1).run().unwrap();
     let theta = estimate.unknowns.iter().find(|unknown| unknown.name == "theta").unwrap();
     assert!(matches!(theta.knowledge, Knowledge::Unidentified), "{estimate}");
+    let found = fitted(free(60.0)).run().unwrap();
+    // A kink; the standard error is 0.03 s.
+    assert!((found.parameters.theta - 3.0).abs() < 0.1 && found.severity() < Severity::NotUsable, "{found}");
 }

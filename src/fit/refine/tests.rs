@@ -49,12 +49,13 @@ fn where_a_search_goes_on() {
     assert_eq!(limited.each_ref().map(|found| may_go_on(found, None, (1, 1))), [true, true, false, true]);
     assert_eq!(go_on(&limited, Some(11.1), 4), [true; 4]);
     assert_eq!(go_on(&limited, Some(10.9), 4), [true, true, false, true]);
-    assert_eq!(go_on(&limited, Some(10.9), 5), [false; 4]);
+    assert_eq!(go_on(&limited, Some(10.9), 9), [true, true, false, true]);
+    assert_eq!(go_on(&limited, Some(10.9), 10), [false; 4]);
     assert_eq!(go_on(&limited, Some(11.1), 5), [true, true, false, true]);
-    // Where the loss has no deviance, no further than five parts, and not where an output is left unexplained.
+    // Where the loss has no deviance, no further than ten parts, and not where an output is left unexplained.
     let robust = limited.map(|one| Summary { deviance: None, ..one });
     assert_eq!(go_on(&robust, None, 4), [true, true, false, true]);
-    assert_eq!(go_on(&robust, None, 5), [false; 4]);
+    assert_eq!(go_on(&robust, None, 10), [false; 4]);
 }
 
 /// A search that ended at a limit of trial steps goes on as long as any are left, and counts the work of all; one that ended at a

@@ -66,6 +66,9 @@ fn is_noise(evidence: &Evidence<'_>, j: usize) -> bool {
     evidence.residuals.outputs[j].rmse <= sigma * (1.0 + 3.0 / (2.0 * evidence.independent(j)).sqrt())
 }
 
+/// Errors below this part of those of the mean are smaller, though it may be by chance.
+const CLEARLY: f64 = 0.95;
+
 /// Outputs that the model explains no better than their mean does.
 fn unexplained(evidence: &Evidence<'_>) -> Vec<Warning> {
     let count = evidence.point.objective.outputs();
@@ -90,7 +93,11 @@ fn unexplained(evidence: &Evidence<'_>) -> Vec<Warning> {
         let at_level = moves.max(rmse) < LEVEL_PART * level.abs();
         let Some(severity) = unexplained_severity(another(j), at_level, worse, partly) else { continue };
         let output = &evidence.point.objective.problem.layout().outputs[j].name;
-        let than = if worse { "worse than" } else { "no better than" };
+        let than = match relative {
+            _ if worse => "worse than",
+            relative if relative < CLEARLY => "not certainly better than",
+            _ => "no better than",
+        };
         let text = format!(
             "the model explains `{output}` {than} its mean does (fit {} %): check signals, signs, units and the start \
              (Fit::starts searches from more), or excite the plant; if noise is all that is left, give its size",

@@ -181,14 +181,16 @@ pub(super) struct Shift {
 /// The largest move of an unknown, or of what the data determine of several unknowns together.
 pub(super) fn shift(evidence: &Evidence<'_>, objective: &Objective<'_>, unknowns: &[Unknown]) -> Option<Shift> {
     let linear = objective.evaluate(&evidence.point.end.coordinates).ok()?;
-    let found = [of_one(&linear, unknowns), of_several(evidence, &linear, unknowns)];
+    let found = [of_one(Some(evidence.point.linear), &linear, unknowns), of_several(evidence, &linear, unknowns)];
     found.into_iter().flatten().max_by(|a, b| a.errors.total_cmp(&b.errors))
 }
 
-/// The largest move of an unknown that is known by itself.
-fn of_one(linear: &Linearization, unknowns: &[Unknown]) -> Option<Shift> {
+/// The largest move of an unknown that is known by itself. The step that slopes ask for at the estimate, where it is at a kink of the cost, is none of it.
+fn of_one(from: Option<&Linearization>, to: &Linearization, unknowns: &[Unknown]) -> Option<Shift> {
     let held: Vec<bool> = unknowns.iter().map(|row| row.knowledge.standard_error().is_none()).collect();
-    let step = linear.step(&vec![0.0; unknowns.len()], &held)?;
+    let step = |linear: &Linearization| linear.step(&vec![0.0; unknowns.len()], &held);
+    let here = from.and_then(step).unwrap_or(vec![0.0; unknowns.len()]);
+    let step: Vec<f64> = step(to)?.iter().zip(here).map(|(to, here)| to - here).collect();
     let of = |i: usize| {
         let (unknown, change) = (&unknowns[i], change(&step, unknowns, i));
         let errors = change / unknown.knowledge.standard_error()?;
@@ -278,7 +280,7 @@ mod tests {
             let mut unknowns = problem.estimate(&[coordinate]).unwrap().unknowns;
             unknowns[0].knowledge = Knowledge::Known { standard_error: 0.5, lower: 1.0, upper: 3.0 };
             let linear = problem.objective().unwrap().evaluate(&[coordinate]).unwrap();
-            let found = of_one(&linear, &unknowns).unwrap();
+            let found = of_one(None, &linear, &unknowns).unwrap();
             assert!(
                 (found.errors - 2.0).abs() < 1e-12 && (found.part - 0.5).abs() < 1e-12,
                 "{} {}",

@@ -1,0 +1,92 @@
+//! Minima at a kink of the cost: where a held input acts late by a whole number of samples, slopes with respect to the dead time differ from one side
+//! to the other, and may lead back from both.
+
+use crate::optimize::{Domain, LeastSquares, LevenbergMarquardt, Linearization, Machine, Request};
+use crate::problem::{Objective, Round};
+
+/// How far beside a kink slopes are asked for, as a part of the unknown. A search ends within 1e-9 of it.
+const BESIDE: f64 = 1e-5;
+/// Slopes that differ by so many times as much as those of a smooth cost do jump.
+const JUMP: f64 = 10.0;
+/// Searches, each with the unknowns kept that are at a kink where it begins.
+const SEARCHES: usize = 3;
+
+/// A round of a model with dead times that found no lower cost, as one that ended at a minimum: while unknowns are kept whose slopes jump there, the
+/// others have a minimum, from which slopes lead back on either side of these.
+pub(super) fn at_kink(objective: &Objective<'_>, round: &Round) -> Option<Round> {
+    let values = objective.values_of(0, &round.coordinates);
+    if !objective.sweep.is_late(&values.p) {
+        return None;
+    }
+    let mut round = round.clone();
+    for _ in 0..SEARCHES {
+        let slopes: Vec<Option<Slopes>> =
+            (0..round.coordinates.len()).map(|i| Slopes::beside(objective, &round.coordinates, i)).collect();
+        round.evaluations += 2 * round.coordinates.len() as u64;
+        let bends = |i: &usize| slopes[*i].is_some_and(|slopes| slopes.jump());
+        let kinks: Vec<usize> = (0..slopes.len()).filter(bends).collect();
+        if kinks.is_empty() {
+            return None;
+        }
+        let mut domain = Domain::of(objective);
+        kinks.iter().for_each(|i| domain.bounds[*i] = (round.coordinates[*i], round.coordinates[*i]));
+        round = search(objective, round, domain);
+        if round.outcome.converged() {
+            let lead_back =
+                |i: &usize| Slopes::beside(objective, &round.coordinates, *i).is_some_and(Slopes::lead_back);
+            return kinks.iter().all(lead_back).then_some(round);
+        }
+    }
+    None
+}
+
+/// The slopes of the cost along an unknown just before a point and just behind it.
+#[derive(Clone, Copy)]
+struct Slopes {
+    before: f64,
+    behind: f64,
+    /// By how much they would differ without a kink, to first order.
+    smooth: f64,
+}
+
+impl Slopes {
+    fn beside(objective: &Objective<'_>, x: &[f64], unknown: usize) -> Option<Self> {
+        let far = BESIDE * if objective.logarithms()[unknown] { 1.0 } else { x[unknown].abs() };
+        let at = |side: f64| {
+            let mut x = x.to_vec();
+            x[unknown] += side * far;
+            let linear = objective.linearize(&x).ok()?;
+            Some((linear.gradient()[unknown], linear.column_norms()[unknown]))
+        };
+        let ((before, norm), (behind, _)) = (at(-1.0)?, at(1.0)?);
+        Some(Slopes { before, behind, smooth: 2.0 * far * norm * norm })
+    }
+
+    /// Whether the slope grows at once.
+    fn jump(self) -> bool {
+        self.behind - self.before > JUMP * self.smooth
+    }
+
+    /// Whether the cost falls before the point and rises behind it.
+    fn lead_back(self) -> bool {
+        self.before < 0.0 && self.behind > 0.0
+    }
+}
+
+/// Goes on from where a round ended, within this domain.
+fn search(objective: &Objective<'_>, round: Round, domain: Domain) -> Round {
+    let mut machine: LevenbergMarquardt = LevenbergMarquardt::default();
+    machine.begin(round.coordinates.clone(), domain);
+    let mut evaluations = round.evaluations;
+    let outcome = loop {
+        evaluations += 1;
+        match machine.request() {
+            Request::Linearize(x) => machine.tell(objective.linearize(x)),
+            Request::Curvature { x, along } => machine.tell_curvature(objective.curvature(x, along)),
+            Request::Ended(outcome) => break outcome,
+        }
+    };
+    let linear: Option<Linearization> = machine.linearization().cloned();
+    let outcome = objective.control.named(outcome);
+    Round { coordinates: machine.place().to_vec(), linear, outcome, evaluations, ..round }
+}
