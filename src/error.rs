@@ -37,7 +37,8 @@ pub enum Error {
     },
     /// A time or input that is not a finite number.
     #[error(
-        "experiment `{experiment}`: `{signal}` is {} at sample {sample} (t = {time}); only outputs may be missing (NaN)", short(*value)
+        "experiment `{experiment}`: `{signal}` is {} at sample {sample} (t = {time}); only outputs may be missing (NaN){}",
+        short(*value), own_rate(signal, *value)
     )]
     NotFinite {
         /// Name of the experiment.
@@ -205,7 +206,7 @@ pub enum Error {
     },
     /// A column in another unit than its signal.
     #[error(
-        "{}: column `{column}` is in \"{file}\" and signal `{signal}` in \"{model}\"; give DataFile::factor(\"{signal}\", {factor}), or 1 if the file's unit is wrong", path.display()
+        "{}: column `{column}` is in \"{file}\" and signal `{signal}` in \"{model}\"; {}", path.display(), other_unit(signal, *factor)
     )]
     Unit {
         /// The file.
@@ -218,8 +219,8 @@ pub enum Error {
         signal: String,
         /// Its unit.
         model: Box<str>,
-        /// The factor from one to the other.
-        factor: f64,
+        /// The factor from one to the other; none where neither is a multiple of the other.
+        factor: Option<f64>,
     },
     /// A file that could not be read or written.
     #[error("{}: {source}", path.display())]
@@ -434,6 +435,24 @@ fn meant(name: &str, available: &[String]) -> String {
 pub(crate) fn short(value: f64) -> String {
     let plain = value == 0.0 || !value.is_finite() || (1e-4..1e7).contains(&value.abs());
     if plain { value.to_string() } else { format!("{value:e}") }
+}
+
+/// What to do about a column in another unit.
+fn other_unit(signal: &str, factor: Option<f64>) -> String {
+    match factor {
+        Some(factor) => format!("give DataFile::factor(\"{signal}\", {factor}), or 1 if the file's unit is wrong"),
+        None => format!(
+            "neither is a multiple of the other: convert the column, or give DataFile::factor(\"{signal}\", 1) if the file's unit is wrong"
+        ),
+    }
+}
+
+/// What to do about an input that is missing.
+fn own_rate(signal: &str, value: f64) -> &'static str {
+    match value.is_nan() && signal != "t" {
+        true => "; fill in an input that has a rate of its own (DataFile::fill, Record::from_series)",
+        false => "",
+    }
 }
 
 /// The line and the text of a cell.

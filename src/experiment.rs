@@ -8,11 +8,11 @@ mod npy;
 
 use crate::error::Error;
 use crate::interval::Hold;
-use crate::layout::{Quantity, quantities};
+use crate::layout::{Layout, Quantity, quantities};
 use crate::model::Model;
 use crate::numeral::TimeUnit;
 use crate::parameter::Parameter;
-use crate::record::{Channel, Holds, Initial, Record, Stored, Time};
+use crate::record::{Channel, Holds, Initial, Record, Series, Stored, Time};
 use crate::signals::{Of, Signals};
 use core::marker::PhantomData;
 use serde::de::Error as _;
@@ -108,6 +108,34 @@ impl<X: Signals, U: Signals, Y: Signals> Experiment<X, U, Y> {
         let inputs = named(inputs, quantities::<U>(), "input")?;
         let outputs = named(outputs, quantities::<Y>(), "output")?;
         Ok(Experiment { record: Record::new(quantities::<X>(), time, inputs, outputs)?, signals: PhantomData })
+    }
+
+    /// A record of signals that have instants of their own, inputs and outputs in the order of their declaration; see [`Record::from_series`].
+    ///
+    /// ```
+    /// use greybox::{Experiment, Hold, pmsm::Surface, record::Series};
+    /// let model = Surface::new(4)?;
+    /// let clock = |step: f64, samples: u32| -> Vec<f64> { (0..samples).map(|k| step * f64::from(k)).collect() };
+    /// let at = |step: f64, samples: u32, value: fn(f64) -> f64| {
+    ///     Series::new(clock(step, samples), clock(step, samples).into_iter().map(value).collect())
+    /// };
+    /// let [ud, uq] = [at(1e-3, 11, |_| 0.0), at(1e-3, 11, |t| 40.0 + t)]; // commands, each ms
+    /// let w = at(5e-3, 3, |t| 100.0 * t).hold(Hold::First); // measured each 5 ms
+    /// let [id, iq] = [at(2e-3, 6, |_| 0.0), at(2e-3, 6, |t| t)]; // each 2 ms
+    /// let record = Experiment::from_series(&model, vec![ud, uq, w], vec![id, iq])?;
+    /// assert_eq!((record.len(), record.input(4).w), (11, 0.4));
+    /// assert!(record.output(3).iq.is_nan() && record.output(4).iq == 4e-3);
+    /// # Ok::<(), greybox::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    /// As [`Record::from_series`].
+    pub fn from_series<M: Model<State = X, Input = U, Output = Y>>(
+        _model: &M,
+        inputs: Vec<Series>,
+        outputs: Vec<Series>,
+    ) -> Result<Self, Error> {
+        Record::from_series(&Layout::of::<M>(), inputs, outputs).map(Experiment::of)
     }
 
     /// The record of a model's signals, as they stand in it.

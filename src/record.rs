@@ -11,6 +11,7 @@ mod inspect;
 mod lengths;
 #[cfg(feature = "npy")]
 mod npy;
+mod series;
 mod stored;
 mod time;
 
@@ -23,6 +24,7 @@ pub(crate) use holds::Holds;
 pub(crate) use inspect::Looked;
 pub use inspect::{ChannelInspection, Inspection, Suspicion};
 pub(crate) use lengths::Lengths;
+pub use series::Series;
 pub(crate) use stored::Stored;
 #[cfg(feature = "csv")]
 pub(crate) use time::Clock;

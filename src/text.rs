@@ -30,23 +30,25 @@ mod compile;
 mod dimension;
 mod document;
 mod expression;
+mod factor;
 mod latex;
 mod lex;
 mod names;
 mod parse;
 mod read;
 mod remark;
+mod remedies;
 mod rust;
 mod section;
 mod shipped;
 mod string;
 mod toml_value;
-mod unit;
 mod write;
 
+pub use factor::factor;
 pub use remark::{Error, Remark};
+pub use remedies::renamed;
 pub use shipped::{Shipped, shipped};
-pub use unit::factor;
 
 use crate::equations::Equations;
 use crate::fit::Fit;

@@ -19,6 +19,7 @@ pub use reading::{DateOrder, Reading, TimeSource};
 
 use super::Record;
 use crate::error::Error;
+use crate::interval::Hold;
 use std::path::{Path, PathBuf};
 
 /// A file, and how it becomes a record.
@@ -78,7 +79,7 @@ use std::path::{Path, PathBuf};
 ///
 /// **Cells** stand between commas, semicolons, tabs, bars or single spaces, may be quoted, and may have white space around them. Numbers
 /// have a point or a comma, the same in the whole file. An output that was not measured is empty, `NaN`, `NA` or `null`; inputs and time
-/// are always there.
+/// are always there, unless an input has a rate of its own and is to be [filled in](DataFile::fill).
 ///
 /// **Lines** that begin with `#` are comments; they are passed over, as are blank lines, and a line such as `sep=;` above the
 /// names. The names stand on the first line that has all those wanted, or in the last comment if numbers follow it at once (as numpy
@@ -134,12 +135,14 @@ struct Column {
     factor: Option<f64>,
     offset: f64,
     reversed: bool,
+    /// How it is filled in where it was not sampled.
+    fill: Option<Hold>,
 }
 
 impl Column {
     fn new(signal: &str) -> Column {
         // Adding minus zero changes no number, not even minus zero.
-        Column { signal: signal.to_owned(), name: None, factor: None, offset: -0.0, reversed: false }
+        Column { signal: signal.to_owned(), name: None, factor: None, offset: -0.0, reversed: false, fill: None }
     }
 
     fn name(&self) -> &str {
@@ -195,6 +198,12 @@ impl DataFile {
     /// Turns the sign of the cells of `signal`: for a sensor mounted the other way round.
     pub fn reversed(self, signal: &str) -> Self {
         self.with(signal, |column| column.reversed = true)
+    }
+
+    /// Fills in an input that has a rate of its own where its cells are empty: by the number before, or by straight lines, which its hold then is.
+    /// Rows at which it is not known yet are left out, and those after its last number where it is a straight line.
+    pub fn fill(self, input: &str, hold: Hold) -> Self {
+        self.with(input, |column| column.fill = Some(hold))
     }
 
     /// Time from a constant sample time (s) instead of a column; it starts at zero.

@@ -5,9 +5,9 @@ use super::document::{Declared, Document};
 use super::expression::{At, Expression, Operation, Sign};
 use super::names::{Callable, Meaning, Names, function, items, names, order};
 use super::remark::{Remark, Source};
-use super::unit::Unit;
 use crate::graph::{Function, Function2};
 use crate::layout::Kind;
+use crate::unit::Unit;
 use std::sync::Arc;
 
 /// What is known of the unit of a value.

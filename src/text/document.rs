@@ -2,11 +2,11 @@
 
 use super::expression::Expression;
 use super::remark::Span;
-use super::unit::Unit;
 use crate::interval::Hold;
 use crate::layout::Kind;
 use crate::parameter::Parameter;
 use crate::scalar::Table;
+use crate::unit::Unit;
 
 /// A name with its place, its unit and a remark for readers.
 #[derive(Clone, Debug)]

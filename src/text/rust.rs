@@ -53,6 +53,30 @@ fn check(document: &Document) -> Result<(), Error> {
     }
 }
 
+/// Names that mean something else in the module, or in Rust.
+const TAKEN: [&str; 20] = [
+    "Clone",
+    "Comparison",
+    "Copy",
+    "Debug",
+    "Default",
+    "Extrapolation",
+    "Hold",
+    "Interpolation",
+    "Kind",
+    "Model",
+    "None",
+    "Nothing",
+    "Of",
+    "Option",
+    "Parameter",
+    "PartialEq",
+    "Scalar",
+    "Self",
+    "Signals",
+    "Some",
+];
+
 /// `PMSM with surface magnets` as `PmsmWithSurfaceMagnets`.
 fn type_name(name: &str) -> String {
     let word = |word: &str| -> String {
@@ -62,8 +86,9 @@ fn type_name(name: &str) -> String {
     };
     let found: String = name.split(|c: char| !c.is_ascii_alphanumeric()).map(word).collect();
     match found.starts_with(|c: char| c.is_ascii_alphabetic()) {
+        true if TAKEN.contains(&found.as_str()) => format!("{found}Plant"),
         true => found,
-        false => format!("Model{found}"),
+        false => format!("Plant{found}"),
     }
 }
 

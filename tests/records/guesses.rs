@@ -117,6 +117,9 @@ fn a_column_in_another_unit_is_refused() {
         ("t,ud,w [rpm],id,iq", "w [rpm]", "DataFile::factor(\"w\", 0.10471975511965977)"),
         ("t,ud [mV],w,id,iq", "ud [mV]", "DataFile::factor(\"ud\", 0.001)"),
         ("t,ud,w,id (kA),iq", "id (kA)", "DataFile::factor(\"id\", 1000)"),
+        ("t,ud,w [Hz],id,iq", "w [Hz]", "DataFile::factor(\"w\", 6.283185307179586)"),
+        ("t,ud,w [V],id,iq", "w [V]", "neither is a multiple of the other"),
+        ("t,ud [N m],w,id,iq", "ud [N m]", "DataFile::factor(\"ud\", 1) if the file's unit is wrong"),
     ] {
         let path = file("units", format!("{header}\n0,1,2,3,4\n1,1,2,3,4\n"));
         says(DataFile::new(&path).read(&Pmsm), &[&format!("column `{column}`"), factor]);

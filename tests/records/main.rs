@@ -10,6 +10,7 @@ mod inspect;
 mod made;
 mod npy;
 mod pmsm;
+mod rates;
 #[path = "../common/refused.rs"]
 mod refused;
 #[path = "../common/shared.rs"]

@@ -242,6 +242,8 @@ impl DataFile {
             units_row: false,
             time: source,
             units: plan.units.clone(),
+            filled: vec![],
+            left_out: 0,
         };
         self.record(plan, columns, time, reading)
     }

@@ -5,12 +5,14 @@ use super::guess::{names, split_unit};
 use super::numbers::Numbers;
 use super::table::Table;
 use super::timing::Timing;
-use super::{Column, DataFile, FileFormat, Reading, TimeSource, reading};
+use super::{Column, DataFile, FileFormat, Reading, TimeSource};
 use crate::error::Error;
 use crate::interval::Hold;
 use crate::layout::{Kind, Layout, Quantity};
 use crate::numeral::{Moment, TimeUnit};
+use crate::record::series::Filled;
 use crate::record::{Channel, Holds, Initial, Record, Time};
+use crate::unit::{Relation, relation};
 use std::sync::Arc;
 
 /// Where the number of one signal comes from.
@@ -19,6 +21,7 @@ pub(super) struct Source {
     pub(super) column: usize,
     factor: f64,
     offset: f64,
+    fill: Option<Hold>,
 }
 
 impl Source {
@@ -108,14 +111,27 @@ impl DataFile {
         (time, time_unit): (Time, TimeUnit),
         reading: Reading,
     ) -> Result<Record, Error> {
+        let samples = columns.first().map_or(0, Vec::len);
         let named = |(mut values, signal): (Vec<f64>, &&Quantity)| {
             values.shrink_to_fit();
             Channel::new(&signal.name, &signal.unit, values)
         };
         let mut inputs: Vec<Channel> = columns.into_iter().zip(&plan.signals).map(named).collect();
-        let outputs = inputs.split_off(plan.layout.inputs.len());
+        let mut outputs = inputs.split_off(plan.layout.inputs.len());
+        let fills: Vec<Option<Hold>> = plan.sources.iter().take(inputs.len()).map(|source| source.fill).collect();
+        let (mut time, mut reading, mut holds) = (time, reading, Holds::All(Hold::default()));
+        if fills.iter().any(Option::is_some) {
+            let filled = Filled::new(&time, samples, &inputs, &fills);
+            if let Some((input, _)) = filled.given.iter().find(|(_, given)| *given == 0) {
+                return Err(self.cannot(format!("`{input}` is to be filled in, but has no number")));
+            }
+            outputs = outputs.iter().map(|channel| channel.part(filled.range.clone())).collect();
+            time = time.part(filled.range.clone());
+            (reading.filled, reading.left_out) = (filled.given, samples - filled.range.len());
+            (inputs, holds) = (filled.inputs, Holds::each(fills.into_iter().map(Option::unwrap_or_default).collect()));
+        }
         let (states, inputs, outputs) = (plan.layout.states.clone().into(), inputs.into(), outputs.into());
-        let (name, holds, initial) = (self.name(), Holds::All(Hold::default()), Initial::default());
+        let (name, initial) = (self.name(), Initial::default());
         let (reading, looked) = (Some(Arc::new(reading)), Arc::default());
         Record { name, states, time, time_unit, inputs, outputs, holds, initial, reading, looked }.checked()
     }
@@ -129,7 +145,7 @@ impl DataFile {
     pub(super) fn check(&self, layout: &Layout) -> Result<(), Error> {
         let signals = layout.inputs.iter().chain(&layout.outputs).map(|signal| signal.name.as_str());
         let known = || signals.clone().chain(["t"]);
-        for Column { signal, factor, offset, .. } in &self.columns {
+        for Column { signal, factor, offset, fill, .. } in &self.columns {
             if !known().any(|name| name == signal) {
                 let available = known().map(|name| (*name).to_owned()).collect();
                 return Err(Error::UnknownSignal { signal: signal.clone(), available });
@@ -137,6 +153,10 @@ impl DataFile {
             if let Some(value) = factor.filter(|factor| !(*factor > 0.0 && factor.is_finite())) {
                 let what = format!("the factor of `{signal}` (DataFile::reversed turns a sign)");
                 return Err(Error::NotPositive { what, value });
+            }
+            if let (Some(_), false) = (fill, layout.inputs.iter().any(|input| input.name == *signal)) {
+                let text = format!("DataFile::fill is for inputs, which `{signal}` is not; outputs may be missing");
+                return Err(Error::Option(text));
             }
             if !offset.is_finite() {
                 return Err(Error::Option(format!("the offset of `{signal}` is {offset}; it must be finite")));
@@ -185,16 +205,31 @@ impl DataFile {
         let written = split_unit(name).1.filter(|_| *name != signal.name);
         if let (None, Some(file)) = (said.factor, written.or_else(|| below(column))) {
             let (file, model) = (file.to_owned(), signal.unit.clone());
-            if let Some(factor) = reading::factor(&file, &model) {
+            let factor = match relation(&file, &model) {
+                Relation::Same => None,
+                // An offset was said.
+                Relation::OtherZero if said.offset != 0.0 => None,
+                Relation::Factor(factor) => Some(Some(factor)),
+                Relation::OtherZero | Relation::Other => Some(None),
+                Relation::Unknown => {
+                    if !file.is_empty() {
+                        units.push((signal.name.clone(), file.clone(), model.clone()));
+                    }
+                    None
+                }
+            };
+            if let Some(factor) = factor {
                 let (path, column, signal) = (self.path.clone(), name.clone(), signal.name.clone());
                 return Err(Error::Unit { path, column, file: file.into(), signal, model: model.into(), factor });
             }
-            if file != model && !file.is_empty() {
-                units.push((signal.name.clone(), file, model));
-            }
         }
         let factor = said.factor.unwrap_or(1.0);
-        Ok(Source { column, factor: if said.reversed { -factor } else { factor }, offset: said.offset })
+        Ok(Source {
+            column,
+            factor: if said.reversed { -factor } else { factor },
+            offset: said.offset,
+            fill: said.fill,
+        })
     }
 
     /// The error of a cell that is no number, or not a finite one.
@@ -244,8 +279,8 @@ impl Rows {
         let time = self.timing.tick(file, table, numbers, sample)?;
         for (i, (column, source)) in self.columns.iter_mut().zip(&plan.sources).enumerate() {
             let value = numbers.read(table.cell(source.column)).map(|number| source.value(number));
-            // An output may be missing, an input may not.
-            let input = i < plan.layout.inputs.len();
+            // An output may be missing, an input may not unless it is filled in.
+            let input = i < plan.layout.inputs.len() && source.fill.is_none();
             let good = |value: &f64| if input { value.is_finite() } else { !value.is_infinite() };
             let Some(value) = value.filter(good) else {
                 let time = Moment { time, unit: self.timing.unit() };
@@ -276,6 +311,8 @@ impl Rows {
             units_row: form.units.is_some(),
             time: source,
             units: plan.units.clone(),
+            filled: vec![],
+            left_out: 0,
         };
         file.record(plan, self.columns, (time, time_unit), reading)
     }

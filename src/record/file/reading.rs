@@ -23,6 +23,10 @@ pub struct Reading {
     /// Signals for which the file has another unit than the model, one of them unknown: name, the file's unit, the model's. They
     /// are not converted.
     pub units: Vec<(String, String, String)>,
+    /// Inputs that were filled in between their own samples, and how many of these there are.
+    pub filled: Vec<(String, usize)>,
+    /// Rows that were left out since one of them is not known there.
+    pub left_out: usize,
 }
 
 /// Where the time of a record comes from.
@@ -87,7 +91,14 @@ impl fmt::Display for Reading {
         for (signal, file, model) in &self.units {
             write!(f, "; `{signal}` in \"{file}\" taken as \"{model}\"")?;
         }
-        Ok(())
+        for (signal, samples) in &self.filled {
+            write!(f, "; `{signal}` filled in between {samples} samples")?;
+        }
+        match self.left_out {
+            0 => Ok(()),
+            1 => write!(f, "; 1 row left out at which it is not known"),
+            rows => write!(f, "; {rows} rows left out at which it is not known"),
+        }
     }
 }
 
@@ -141,47 +152,4 @@ pub(super) fn of_size(size: f64) -> Option<TimeUnit> {
 
 fn unit_name(size: f64) -> String {
     of_size(size).map_or_else(|| format!("units of {size} s"), |unit| unit.name().to_owned())
-}
-
-/// Other units in which instruments write what models have in SI units: the unit, the model's, and the factor between them.
-const FACTORS: [(&[&str], &str, f64); 12] = [
-    (&["rpm", "1/min", "min-1", "u/min", "r/min", "rev/min"], "rad/s", core::f64::consts::PI / 30.0),
-    (&["hz", "1/s", "rps", "rev/s"], "rad/s", core::f64::consts::TAU),
-    (&["deg/s", "°/s"], "rad/s", core::f64::consts::PI / 180.0),
-    (&["deg", "°"], "rad", core::f64::consts::PI / 180.0),
-    (&["km/h"], "m/s", 1.0 / 3.6),
-    (&["bar"], "pa", 1e5),
-    (&["l/min"], "m^3/s", 1e-3 / 60.0),
-    (&["l/s"], "m^3/s", 1e-3),
-    (&["%"], "1", 1e-2),
-    (&["g"], "kg", 1e-3),
-    (&["min"], "s", 60.0),
-    (&["h"], "s", 3600.0),
-];
-
-/// Prefixes that occur in records, and their factors.
-const PREFIXES: [(char, f64); 6] = [('m', 1e-3), ('u', 1e-6), ('µ', 1e-6), ('k', 1e3), ('M', 1e6), ('n', 1e-9)];
-
-/// Units that take a prefix.
-const PREFIXED: [&str; 14] = ["V", "A", "W", "ohm", "H", "F", "N", "Nm", "N m", "m", "s", "Pa", "Hz", "J"];
-
-/// Factor from one unit to another, where both are known and differ: revolutions per minute to rad/s, mA to A.
-pub(super) fn factor(from: &str, to: &str) -> Option<f64> {
-    let lower = from.to_lowercase();
-    let listed =
-        |(units, model, _): &&(&[&str], &str, f64)| units.contains(&lower.as_str()) && *model == to.to_lowercase();
-    if let Some((.., factor)) = FACTORS.iter().find(listed) {
-        return Some(*factor);
-    }
-    let scaled = |unit: &str| {
-        if PREFIXED.contains(&unit) {
-            return Some((unit.to_owned(), 1.0));
-        }
-        let mut letters = unit.chars();
-        let (first, rest) = (letters.next()?, letters.as_str());
-        let (_, factor) = PREFIXES.iter().find(|(prefix, _)| *prefix == first)?;
-        PREFIXED.contains(&rest).then(|| (rest.to_owned(), *factor))
-    };
-    let ((from, size), (to, of)) = (scaled(from)?, scaled(to)?);
-    (from == to && size != of).then_some(size / of)
 }

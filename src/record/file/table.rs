@@ -13,8 +13,11 @@ use std::path::{Path, PathBuf};
 
 const NEWLINE: &[u8] = b"\n";
 
-/// Bytes that are looked at before the rows are read.
+/// Bytes that are looked at before the rows are read, and the most where names or remarks are longer than that.
 const HEAD: u64 = 1 << 16;
+const LONGEST: u64 = 1 << 24;
+/// Lines that are wanted among them besides remarks.
+const LINES: usize = 3;
 
 type Bytes = Chain<Chain<Cursor<Vec<u8>>, File>, &'static [u8]>;
 
@@ -29,10 +32,7 @@ pub(super) struct Table {
 impl Table {
     /// Opens the file and reads the names of its columns; what was not said of the file is guessed, by the names that are wanted.
     pub(super) fn open(file: &DataFile, wanted: &[&str]) -> Result<Table, Error> {
-        let failed = |source: io::Error| file.cannot(source);
-        let mut bytes = File::open(&file.path).map_err(failed)?;
-        let mut head = Vec::new();
-        Read::by_ref(&mut bytes).take(HEAD).read_to_end(&mut head).map_err(failed)?;
+        let (mut head, bytes) = begin(file)?;
         if head.starts_with(b"\xff\xfe") || head.starts_with(b"\xfe\xff") {
             return Err(file.cannot("the file is UTF-16; save it as UTF-8"));
         }
@@ -48,10 +48,7 @@ impl Table {
 
     /// This file once more, from its first row.
     pub(super) fn again(&self, file: &DataFile) -> Result<Table, Error> {
-        let failed = |source: io::Error| file.cannot(source);
-        let mut bytes = File::open(&file.path).map_err(failed)?;
-        let mut head = Vec::new();
-        Read::by_ref(&mut bytes).take(HEAD).read_to_end(&mut head).map_err(failed)?;
+        let (head, bytes) = begin(file)?;
         Ok(Table::with(file, self.form.clone(), head, bytes))
     }
 
@@ -106,6 +103,22 @@ impl Table {
     pub(super) fn cell(&self, column: usize) -> &[u8] {
         self.row.get(column).unwrap_or_default().trim_ascii()
     }
+}
+
+/// The first bytes of a file, with its first lines, and the file behind them.
+fn begin(file: &DataFile) -> Result<(Vec<u8>, File), Error> {
+    let failed = |source: io::Error| file.cannot(source);
+    let mut bytes = File::open(&file.path).map_err(failed)?;
+    let mut head = Vec::new();
+    let mut more = HEAD;
+    while more > 0 {
+        let read = Read::by_ref(&mut bytes).take(more).read_to_end(&mut head).map_err(failed)? as u64;
+        let ended = head.iter().rposition(|byte| *byte == b'\n').map_or(&[][..], |end| &head[..end]);
+        let lines = ended.split(|byte| *byte == b'\n').filter(|line| !line.is_empty() && line[0] != file.comment);
+        let enough = read < more || lines.count() >= LINES || head.len() as u64 >= LONGEST;
+        more = if enough { 0 } else { head.len() as u64 };
+    }
+    Ok((head, bytes))
 }
 
 /// How the cells of a file stand in a line.

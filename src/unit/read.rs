@@ -36,7 +36,9 @@ impl Reader<'_> {
     }
 
     fn factor(&mut self) -> Result<Unit, NoUnit> {
+        let before = self.rest;
         let unit = self.atom()?;
+        let before = &before[..before.len() - self.rest.len()];
         let raised = self.sign(&["**", "^"]);
         let rest = if raised { self.rest.trim_start() } else { self.rest };
         for (superscript, power) in [("²", 2.0), ("³", 3.0), ("⁻¹", -1.0), ("⁻²", -2.0)] {
@@ -45,7 +47,10 @@ impl Reader<'_> {
                 return Ok(unit.power(power));
             }
         }
-        if !raised {
+        // `s2` and `min-1`, as files write powers: a number at once behind a symbol.
+        let digits = rest.strip_prefix('-').unwrap_or(rest);
+        let follows = before.ends_with(char::is_alphabetic) && digits.starts_with(|c: char| c.is_ascii_digit());
+        if !raised && !follows {
             return Ok(unit);
         }
         let wrong = NoUnit::Wrong(format!("`^{rest}` is no power"));

@@ -8,13 +8,13 @@ mod display;
 mod known;
 mod read;
 
-use super::remark::Error;
 use read::Reader;
 use std::collections::BTreeMap;
+use std::f64::consts::TAU;
 
 /// Powers of base units, and how many of their product it is.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Unit {
+pub(crate) struct Unit {
     /// By the symbol of the base unit; none is zero.
     powers: BTreeMap<String, f64>,
     /// `None` where a number of unknown unit has entered, such as a factor of conversion.
@@ -78,6 +78,11 @@ impl Unit {
         Unit { powers, factor: self.factor.map(|factor| factor.powf(n)) }
     }
 
+    /// This dimension in units of its base.
+    pub fn of_size_one(self) -> Unit {
+        Unit { factor: Some(1.0), ..self }
+    }
+
     /// This dimension in a size that is not known.
     pub fn of_any_size(self) -> Unit {
         Unit { factor: None, ..self }
@@ -100,40 +105,83 @@ impl Unit {
     }
 }
 
-/// How many of the unit `to` one of the unit `from` is: `factor("rpm", "rad/s")` is 0.1047. Of degrees Celsius it is that of
-/// their differences.
-///
-/// # Errors
-/// A text that is no unit, units of different dimensions.
-///
-/// ```
-/// use greybox::text::factor;
-/// assert!((factor("rpm", "rad/s")? - 0.104_719_755).abs() < 1e-9);
-/// assert_eq!(factor("mA", "V").unwrap_err().to_string(), "`mA` is in A, `V` is in V; neither is a multiple of the other");
-/// # Ok::<(), greybox::text::Error>(())
-/// ```
-pub fn factor(from: &str, to: &str) -> Result<f64, Error> {
-    let read = |text: &str| {
-        Unit::read(text, &BTreeMap::new()).map_err(|no| {
-            Error::Unit(match no {
-                NoUnit::Unknown(symbol) => format!("unit `{text}`: `{symbol}` is not known"),
-                NoUnit::Wrong(wrong) => format!("unit `{text}`: {wrong}"),
-            })
-        })
-    };
-    let (a, b) = (read(from)?, read(to)?);
-    match a.factor.zip(b.factor) {
-        Some((one, other)) if a.same_dimension(&b) => Ok(one / other),
-        _ => {
-            let [a, b] = [a, b].map(|unit| Unit { factor: Some(1.0), ..unit });
-            Err(Error::Unit(format!("`{from}` is in {a}, `{to}` is in {b}; neither is a multiple of the other")))
-        }
+/// How a column's unit stands to that of the signal.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Relation {
+    /// Both are as large.
+    Same,
+    /// So many of the signal's is one of the column's.
+    Factor(f64),
+    /// Scales of temperature that begin elsewhere.
+    OtherZero,
+    /// Both are known, and neither is a multiple of the other.
+    Other,
+    /// One of them is not known, or the signal is a ratio, which may stand for anything.
+    Unknown,
+}
+
+/// How files write some units, in small letters.
+const WRITTEN: [(&str, &str); 7] = [
+    ("hz", "Hz"),
+    ("rpm", "rpm"),
+    ("u/min", "rpm"),
+    ("r/min", "rpm"),
+    ("rps", "rev/s"),
+    ("l/min", "l/min"),
+    ("pa", "Pa"),
+];
+
+/// Scales of temperature, by where they begin.
+const ZEROS: [&[&str]; 3] = [&["K", "mK"], &["degC", "°C", "℃"], &["degF", "°F", "℉"]];
+
+/// How the unit `from` of a column stands to the unit `to` of a signal. A frequency (Hz, 1/min) that stands for an angular velocity counts
+/// revolutions.
+pub(crate) fn relation(from: &str, to: &str) -> Relation {
+    let (from, to) = (from.trim(), to.trim());
+    if from.is_empty() {
+        return Relation::Unknown;
     }
+    let written = |text: &str| WRITTEN.iter().find(|(file, _)| *file == text.to_lowercase()).map(|(_, unit)| *unit);
+    let zero = |text: &str| ZEROS.iter().position(|all| all.contains(&text));
+    let from = match (written(from), zero(to)) {
+        (Some(unit), _) => unit,
+        // A coulomb is no temperature.
+        (None, Some(_)) if from == "C" => "degC",
+        _ => from,
+    };
+    if from == to || zero(from).is_some() && zero(from) == zero(to) && from != "mK" && to != "mK" {
+        return Relation::Same;
+    }
+    if zero(from).zip(zero(to)).is_some_and(|(a, b)| a != b) {
+        return Relation::OtherZero;
+    }
+    let read = |text: &str| Unit::read(text, &BTreeMap::new()).ok();
+    let Some((one, other)) = read(from).zip(read(to)) else { return Relation::Unknown };
+    match one.factor.zip(other.factor) {
+        Some(_) if one.same_dimension(&other) && is_frequency(from, &one) && to.contains("rad") => {
+            Relation::Factor(one.factor.unwrap_or(1.0) / other.factor.unwrap_or(1.0) * TAU)
+        }
+        Some((a, b)) if one.same_dimension(&other) => {
+            if one.same_size(&other) {
+                Relation::Same
+            } else {
+                Relation::Factor(a / b)
+            }
+        }
+        Some(_) if !other.is_dimensionless() && !from.eq_ignore_ascii_case(to) => Relation::Other,
+        _ => Relation::Unknown,
+    }
+}
+
+/// Whether a unit is one over a time, and its text names no angle.
+fn is_frequency(text: &str, unit: &Unit) -> bool {
+    let angles = ["rad", "deg", "°", "rev", "turn", "rpm"];
+    unit.same_dimension(&Unit::one().over(&Unit::second())) && !angles.iter().any(|angle| text.contains(angle))
 }
 
 /// Why a text is no unit.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) enum NoUnit {
+pub(crate) enum NoUnit {
     /// A symbol that nobody has declared.
     Unknown(String),
     Wrong(String),
@@ -174,6 +222,11 @@ mod tests {
             ("cd", "cd"),
             ("min", "60 s"),
             ("1/s", "s^-1"),
+            ("m/s2", "m/s^2"),
+            ("m3/h", "m^3/h"),
+            ("cm3", "1e-6 m^3"),
+            ("min-1", "1/min"),
+            ("kg m2", "kg m^2"),
         ] {
             let (a, b) = (unit(a), unit(b));
             assert!(a.same_dimension(&b) && a.same_size(&b), "{a:?} {b:?}");
@@ -187,6 +240,50 @@ mod tests {
         }
         for text in ["V/", "m^x", "(m", "m)", "0 V", "m^(1/0)", &"(".repeat(1000)] {
             assert!(matches!(Unit::read(text, &BTreeMap::new()), Err(NoUnit::Wrong(_))), "{text}");
+        }
+    }
+
+    /// A column of volts is no speed, in whatever unit the speed is; a ratio may stand for anything.
+    #[test]
+    fn units_of_columns() {
+        for (from, to, expected) in [
+            ("V", "V", Relation::Same),
+            ("Nm", "N m", Relation::Same),
+            ("C", "degC", Relation::Same),
+            ("°C", "degC", Relation::Same),
+            ("rad/s", "1/s", Relation::Same),
+            ("mA", "A", Relation::Factor(1e-3)),
+            ("RPM", "rad/s", Relation::Factor(TAU / 60.0)),
+            ("Hz", "rad/s", Relation::Factor(TAU)),
+            ("kHz", "rad/s", Relation::Factor(1e3 * TAU)),
+            ("1/min", "rad/s", Relation::Factor(TAU / 60.0)),
+            ("min-1", "rad/s", Relation::Factor(TAU / 60.0)),
+            ("s^-1", "rad/s", Relation::Factor(TAU)),
+            ("rev/s", "rad/s", Relation::Factor(TAU)),
+            ("deg/s", "rad/s", Relation::Factor(TAU / 360.0)),
+            ("rad/min", "rad/s", Relation::Factor(1.0 / 60.0)),
+            ("1/min", "Hz", Relation::Factor(1.0 / 60.0)),
+            ("%", "1", Relation::Factor(1e-2)),
+            ("m3/h", "m^3/s", Relation::Factor(1.0 / 3600.0)),
+            ("mK", "K", Relation::Factor(1e-3)),
+            ("K", "degC", Relation::OtherZero),
+            ("degF", "degC", Relation::OtherZero),
+            ("degC", "K", Relation::OtherZero),
+            ("V", "rad/s", Relation::Other),
+            ("Nm", "rad/s", Relation::Other),
+            ("V", "degC", Relation::Other),
+            ("ticks", "rad/s", Relation::Unknown),
+            ("V", "pulse", Relation::Unknown),
+            ("V", "1", Relation::Unknown),
+            ("", "V", Relation::Unknown),
+            ("a", "A", Relation::Unknown),
+        ] {
+            match (relation(from, to), expected) {
+                (Relation::Factor(found), Relation::Factor(expected)) => {
+                    assert!((found / expected - 1.0).abs() < 1e-14, "{from} {to}: {found}");
+                }
+                (found, expected) => assert_eq!(found, expected, "{from} {to}"),
+            }
         }
     }
 
