@@ -28,6 +28,7 @@ pub use warning::{About, Warning, WarningCode};
 use crate::information::{Covariance, SquareMatrix};
 use crate::layout::Layout;
 use crate::optimize::Outcome;
+use crate::problem::Role;
 use crate::severity::Severity;
 use serde::{Deserialize, Serialize};
 
@@ -98,6 +99,28 @@ impl Summary {
     /// The unknowns as an optimizer sees them: logarithms where these were estimated.
     pub(crate) fn coordinates(&self) -> Vec<f64> {
         self.unknowns.iter().map(|unknown| unknown.transform.to_coordinate(unknown.value)).collect()
+    }
+
+    /// The parameters that each experiment has for itself, by their places in the layout.
+    pub fn own_parameters(&self) -> Vec<usize> {
+        let own = |unknown: &Unknown| match (unknown.role, unknown.experiment) {
+            (Role::Parameter(j), Some(_)) => Some(j),
+            _ => None,
+        };
+        let mut found: Vec<usize> = self.unknowns.iter().filter_map(own).collect();
+        found.sort_unstable();
+        found.dedup();
+        found
+    }
+
+    /// This estimate for one experiment of the fit, by its place: with the values that its parameters have there. `None` if the fit had no experiment of this
+    /// place.
+    pub fn of_experiment(&self, experiment: usize) -> Option<Summary> {
+        let own = self.experiments.get(experiment)?.clone();
+        let mut found = self.clone();
+        found.parameters.iter_mut().zip(&own.parameters).for_each(|(parameter, value)| parameter.value = *value);
+        found.experiments = vec![own];
+        Some(found)
     }
 
     /// The worst that is said of this estimate.

@@ -57,9 +57,9 @@ pub enum Command {
     Man(Man),
 }
 
-/// The model and what is changed of its declarations.
+/// Values that the model is given: all that a simulation takes of its declarations.
 #[derive(Args, Clone, Debug, Default)]
-pub struct ModelOptions {
+pub struct Values {
     /// Give a constant of the model another value.
     #[arg(long, value_name = "NAME=VALUE", value_parser = assignment)]
     pub constant: Vec<(String, String)>,
@@ -69,6 +69,17 @@ pub struct ModelOptions {
     /// Keep a parameter at a value.
     #[arg(long, value_name = "NAME=VALUE", value_parser = assignment)]
     pub fix: Vec<(String, String)>,
+    /// The state at the first sample: `id=0` known, `id~0` estimated from there; `first` takes all from the first sample,
+    /// `steady` those at which the plant rests.
+    #[arg(long, value_name = "NAME=VALUE")]
+    pub initial: Vec<String>,
+}
+
+/// The model and what is changed of its declarations.
+#[derive(Args, Clone, Debug, Default)]
+pub struct ModelOptions {
+    #[command(flatten)]
+    pub values: Values,
     /// Estimate a parameter that the model keeps.
     #[arg(long, value_name = "NAME")]
     pub free: Vec<String>,
@@ -87,10 +98,6 @@ pub struct ModelOptions {
     /// Give each record a value of its own of a parameter.
     #[arg(long, value_name = "NAME")]
     pub per_record: Vec<String>,
-    /// The state at the first sample: `id=0` known, `id~0` estimated from there; `first` takes all from the first sample,
-    /// `steady` those at which the plant rests.
-    #[arg(long, value_name = "NAME=VALUE")]
-    pub initial: Vec<String>,
 }
 
 /// What stands first in a date.
@@ -122,11 +129,14 @@ pub struct RecordOptions {
     #[arg(long, value_name = "ZONE")]
     pub zone: Option<String>,
     /// Time from a constant sample time (s) instead of a column.
-    #[arg(long, value_name = "SECONDS")]
+    #[arg(long, value_name = "SECONDS", conflicts_with = "time")]
     pub sample_time: Option<f64>,
     /// How an input behaves between samples: `w=first` (a straight line), `ud=zero` (held).
     #[arg(long, value_name = "INPUT=HOLD", value_parser = assignment)]
     pub hold: Vec<(String, String)>,
+    /// Fill in an input that has a rate of its own, where its cells are empty, by its hold.
+    #[arg(long, value_name = "INPUT")]
+    pub fill: Vec<String>,
     /// Use the samples between two times (s) only: `1.5..20`; either may be left out.
     #[arg(long, value_name = "FROM..TO")]
     pub between: Option<String>,
@@ -240,7 +250,7 @@ pub struct Simulate {
     /// A file with the inputs and the time.
     pub records: Vec<PathBuf>,
     #[command(flatten, next_help_heading = "Model")]
-    pub of_model: ModelOptions,
+    pub of_model: Values,
     #[command(flatten, next_help_heading = "Records")]
     pub of_records: RecordOptions,
     /// Take the parameters from an estimate (`fit --json`).
@@ -324,7 +334,8 @@ pub struct Fleet {
     #[command(flatten, next_help_heading = "Fit")]
     pub of_fit: FitOptions,
     /// The table, .csv or .parquet: one row for each record. Records that are in it, or in the journal of an interrupted run,
-    /// are not fitted again.
+    /// are not fitted again, but for those that failed. A file beside it, with `.run` at the end of its name, has the model
+    /// and the options that made it; rows of others are not added.
     #[arg(short, long, value_name = "FILE")]
     pub out: Option<PathBuf>,
 }

@@ -9,14 +9,14 @@ use greybox::record::{ChannelInspection, Record};
 use greybox::{Parameter, text::Model};
 
 pub fn run(one: &Check, terminal: &Terminal) -> Result<Verdict, Failure> {
-    let model = model(one.model.as_deref(), &one.of_model.constant, terminal)?;
+    let model = model(one.model.as_deref(), &one.of_model.values.constant, terminal)?;
     let parameters = declared(&model, &one.of_model)?;
     output::line(described(&model, &parameters))?;
     let mut verdict = if model.warnings().is_empty() { Verdict::Usable } else { Verdict::WithCare };
     if one.records.is_empty() {
         return Ok(verdict);
     }
-    let records = records::all(&one.records, &model, &one.of_records, &one.of_model.initial, terminal)?;
+    let records = records::all(&one.records, &model, &one.of_records, &one.of_model.values.initial, terminal)?;
     for record in &records {
         let (text, remarks) = looked_at(record);
         output::line(text)?;

@@ -1,7 +1,7 @@
 //! `compare`: several models or estimates on the same records, on one page.
 
 use crate::arguments::Compare;
-use crate::fitting::{Loaded, declared, estimate, model, watched};
+use crate::fitting::{Loaded, declared, estimate, expanded, model, watched};
 use crate::terminal::Terminal;
 use crate::{Failure, Verdict, fit, output, records};
 use greybox::diagnose::Compared;
@@ -23,16 +23,18 @@ pub fn run(one: &Compare, terminal: &Terminal) -> Result<Verdict, Failure> {
     if one.records.is_empty() {
         return Err("no record is named; those before --validation are fitted, those after it predicted".into());
     }
-    let entrants = one.models.iter().map(|name| entrant(name, one, terminal)).collect::<Result<Vec<_>, _>>()?;
+    output::check(one.report.as_deref(), &output::REPORTS)?;
+    let (files, validation) = (expanded(&one.records)?, expanded(&one.validation)?);
+    let entrants = one.models.iter().map(|name| entrant(name, one, &files, terminal)).collect::<Result<Vec<_>, _>>()?;
     let Some(first) = entrants.first() else { return Err("no model is named: --model MODEL".into()) };
     let mut compared = vec![];
     for (k, record) in first.loaded.records.iter().enumerate() {
         compared
             .push(predicted(Compared::estimation(record), &entrants, |entrant| Ok(entrant.loaded.records[k].clone()))?);
     }
-    for path in &one.validation {
+    for path in &validation {
         let read = |entrant: &Entrant| {
-            records::one(path, &entrant.loaded.model, &one.of_records, &one.of_model.initial, &terminal.silent())
+            records::one(path, &entrant.loaded.model, &one.of_records, &one.of_model.values.initial, &terminal.silent())
         };
         compared.push(predicted(Compared::validation(&read(first)?), &entrants, read)?);
     }
@@ -46,7 +48,7 @@ pub fn run(one: &Compare, terminal: &Terminal) -> Result<Verdict, Failure> {
     }
     output::line(if terminal.colored() { short.to_colored_text() } else { short.to_string() })?;
     if let Some(path) = &one.report {
-        whole.titled("Comparison of models").save(path)?;
+        output::report(path, &whole.titled("Comparison of models"))?;
         terminal.remark(format_args!("report: {}", path.display()));
     }
     // The verdict is that of the best one.
@@ -55,15 +57,15 @@ pub fn run(one: &Compare, terminal: &Terminal) -> Result<Verdict, Failure> {
 }
 
 /// Reads a model, with its estimate or fitted.
-fn entrant(name: &str, one: &Compare, terminal: &Terminal) -> Result<Entrant, Failure> {
+fn entrant(name: &str, one: &Compare, files: &[PathBuf], terminal: &Terminal) -> Result<Entrant, Failure> {
     let (name, stored) = match name.rsplit_once(':') {
         Some((name, stored)) if stored.ends_with(".json") => (name, Some(PathBuf::from(stored))),
         _ => (name, None),
     };
-    let model = model(Some(name), &one.of_model.constant, terminal)?;
+    let model = model(Some(name), &one.of_model.values.constant, terminal)?;
     let parameters = declared(&model, &one.of_model)?;
-    let records = records::all(&one.records, &model, &one.of_records, &one.of_model.initial, terminal)?;
-    let loaded = Loaded { model, files: one.records.clone(), records, parameters };
+    let records = records::all(files, &model, &one.of_records, &one.of_model.values.initial, terminal)?;
+    let loaded = Loaded { model, files: files.to_vec(), records, parameters };
     let problem = watched(&loaded, &one.of_fit, terminal)?.problem()?;
     let estimate = match &stored {
         Some(path) => {

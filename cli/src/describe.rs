@@ -21,6 +21,7 @@ pub struct Examined {
 
 /// Fits, or takes the estimate that is named.
 pub fn examined(refit: &Refit, terminal: &Terminal) -> Result<Examined, Failure> {
+    output::check(refit.report.as_deref(), &output::REPORTS)?;
     let loaded = load(&refit.fitting, terminal)?;
     let counter = Arc::new(AtomicU64::new(0));
     let problem = watched(&loaded, &refit.fitting.of_fit, terminal)?.counter(counter.clone()).problem()?;
@@ -50,7 +51,7 @@ pub fn said(
     }
     output::line(if terminal.colored() { short.to_colored_text() } else { short.to_string() })?;
     if let Some(path) = &refit.report {
-        whole.save(path)?;
+        output::report(path, &whole)?;
         terminal.remark(format_args!("report: {}", path.display()));
     }
     Ok(severity.into())

@@ -6,6 +6,7 @@ use crate::terminal::Terminal;
 use crate::{Failure, Verdict, output};
 
 pub fn run(one: &Export, terminal: &Terminal) -> Result<Verdict, Failure> {
+    output::check(one.out.as_deref(), &[])?;
     let model = model(one.model.as_deref(), &one.constant, terminal)?;
     let text = match one.language {
         Language::Toml => model.to_toml(),

@@ -5,13 +5,14 @@ use crate::fitting::{Loaded, load, watched};
 use crate::terminal::Terminal;
 use crate::{Failure, Verdict, output};
 use greybox::diagnose::{Derived, derived_by};
+use greybox::estimate::ExperimentEstimate;
 use greybox::problem::Problem;
 use greybox::report::{Cell, Origin, Section, Table};
 use greybox::{Report, Summary};
 
 pub fn run(one: &Fit, terminal: &Terminal) -> Result<Verdict, Failure> {
     output::check(one.json.as_deref(), &[])?;
-    output::check(one.report.as_deref(), &["html", "md", "json", "txt"])?;
+    output::check(one.report.as_deref(), &output::REPORTS)?;
     output::check(one.plot.as_deref(), if cfg!(feature = "png") { &["svg", "png"] } else { &["svg"] })?;
     let loaded = load(&one.fitting, terminal)?;
     let derived: Vec<_> = one
@@ -24,8 +25,15 @@ pub fn run(one: &Fit, terminal: &Terminal) -> Result<Verdict, Failure> {
     if terminal.stopped() {
         terminal.remark("ended by Ctrl-C: this is the best so far");
     }
-    let derived: Vec<Derived> =
-        derived.iter().map(|(name, graph, root)| derived_by(&estimate, name, graph, *root)).collect();
+    let records = match estimate.own_parameters().is_empty() {
+        true => &estimate.experiments[..estimate.experiments.len().min(1)],
+        false => &estimate.experiments[..],
+    };
+    let of_record = |(k, record): (usize, &ExperimentEstimate)| {
+        let name = |name: &str| if records.len() > 1 { format!("{name} [{}]", record.name) } else { name.to_owned() };
+        derived.iter().map(|(of, graph, root)| derived_by(&estimate, k, &name(of), graph, *root)).collect::<Vec<_>>()
+    };
+    let derived: Vec<Derived> = records.iter().enumerate().flat_map(of_record).collect();
     let wanted = one.full || one.report.is_some() || one.plot.is_some();
     let report = if wanted { Some(report(&problem, &estimate, &loaded, &derived)?) } else { None };
     match &report {
@@ -34,31 +42,40 @@ pub fn run(one: &Fit, terminal: &Terminal) -> Result<Verdict, Failure> {
         }
         _ => {
             output::line(&estimate)?;
-            for Derived { name, value, standard_error, interval } in &derived {
-                let known = match (standard_error, interval) {
-                    (Some(error), Some((lower, upper))) => {
-                        format!("std. error {error:.2e}, 95 % interval {lower:.6} … {upper:.6}")
-                    }
-                    _ => "not known: it depends on a parameter that is not".to_owned(),
-                };
-                output::line(format!("{name} = {value:.6}, {known}"))?;
-            }
+            derived.iter().try_for_each(|one| output::line(shown(one)))?;
         }
     }
     if let Some(path) = &one.json {
         output::write(Some(path), estimate.to_json()?.as_bytes())?;
     }
     if let (Some(report), Some(path)) = (&report, &one.report) {
-        report.save(path)?;
+        output::report(path, report)?;
         terminal.remark(format_args!("report: {}", path.display()));
     }
     if let (Some(report), Some(path)) = (&report, &one.plot) {
         let plot = report.plots().into_iter().find(|plot| plot.name.starts_with("record-"));
-        plot.ok_or("the report has no drawing of a record")?.save(path)?;
+        let plot = plot.ok_or("the report has no drawing of a record")?;
+        let drawing = match output::ending(path).as_str() {
+            #[cfg(feature = "png")]
+            "png" => plot.to_png()?,
+            _ => plot.to_svg().into_bytes(),
+        };
+        output::write(Some(path), &drawing)?;
         terminal.remark(format_args!("plot: {}", path.display()));
     }
     let said = report.map_or(estimate.severity(), |report| report.severity.max(estimate.severity()));
     Ok(said.into())
+}
+
+/// A derived quantity with the digits that its standard error leaves.
+fn shown(one: &Derived) -> String {
+    let (Some(error), Some((lower, upper))) = (one.standard_error, one.interval) else {
+        let value = Cell::number(one.value, 6);
+        return format!("{} = {}, not known: it depends on a parameter that is not", one.name, value.text());
+    };
+    let [value, lower, upper] = [one.value, lower, upper].map(|number| Cell::resolved(number, error));
+    let (value, error, lower, upper) = (value.text(), Cell::error(error), lower.text(), upper.text());
+    format!("{} = {value}, std. error {}, 95 % interval {lower} … {upper}", one.name, error.text())
 }
 
 /// The report of a fit, with where it came from.

@@ -23,12 +23,13 @@ pub struct Loaded {
 
 /// Reads the model and the records of a fit.
 pub fn load(fitting: &Fitting, terminal: &Terminal) -> Result<Loaded, Failure> {
-    let model = model(fitting.model.as_deref(), &fitting.of_model.constant, terminal)?;
+    let model = model(fitting.model.as_deref(), &fitting.of_model.values.constant, terminal)?;
     let parameters = declared(&model, &fitting.of_model)?;
     if fitting.records.is_empty() {
         return Err("no record is named; write its file after the model: greybox fit MODEL RECORD.csv".into());
     }
-    let records = records::all(&fitting.records, &model, &fitting.of_records, &fitting.of_model.initial, terminal)?;
+    let records =
+        records::all(&fitting.records, &model, &fitting.of_records, &fitting.of_model.values.initial, terminal)?;
     let of_model = fitting.model.iter().map(PathBuf::from).filter(|path| path.exists());
     let files = of_model.chain(expanded(&fitting.records)?).collect();
     Ok(Loaded { model, files, records, parameters })
@@ -72,11 +73,11 @@ pub fn declared(model: &Model, options: &ModelOptions) -> Result<Vec<Parameter>,
     for name in &options.free {
         change(name, &|one| Parameter { free: true, ..one })?;
     }
-    for (name, value) in &options.set {
+    for (name, value) in &options.values.set {
         let start = number(&format!("--set {name}"), value)?;
         change(name, &|one| Parameter { start, ..one })?;
     }
-    for (name, value) in &options.fix {
+    for (name, value) in &options.values.fix {
         let start = number(&format!("--fix {name}"), value)?;
         change(name, &|one| Parameter { start, free: false, ..one })?;
     }

@@ -7,7 +7,7 @@ mod row;
 mod table;
 
 use crate::arguments::Fleet;
-use crate::fitting::{declared, expanded, fit, model};
+use crate::fitting::{declared, expanded, fit, model, shipped};
 use crate::terminal::Terminal;
 use crate::{Failure, Verdict, output, records};
 use greybox::optimize::Outcome;
@@ -16,26 +16,34 @@ use greybox::text::Model;
 use row::{Header, Name, Row};
 use std::cell::RefCell;
 use std::collections::{HashMap, HashSet, VecDeque};
-use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::{Path, PathBuf};
 use table::Table;
 
 pub fn run(one: &Fleet, terminal: &Terminal) -> Result<Verdict, Failure> {
-    let model = model(one.model.as_deref(), &one.of_model.constant, terminal)?;
+    let model = model(one.model.as_deref(), &one.of_model.values.constant, terminal)?;
     let layout = model.equations().layout();
     let parameters = declared(&model, &one.of_model)?;
-    let paths = expanded(&one.records)?;
+    let (paths, again) = distinct(expanded(&one.records)?);
     if paths.is_empty() {
         return Err("no record is named; write files or a pattern after the model: 'data/*.csv'".into());
     }
+    if again > 0 {
+        terminal.remark(format_args!("{again} files are named again; each is read once"));
+    }
     let fleet = fit(&model, &[], &parameters, &one.of_fit)?.cancel(terminal.stop()).fleet()?;
-    let mut table = Table::open(one.out.as_deref(), Header::new(layout, one.by.as_deref())?, &made_by(one))?;
+    let mut table = Table::open(one.out.as_deref(), Header::new(layout, one.by.as_deref())?, made_by(one)?)?;
     let before = table.rows().len();
     if before > 0 {
         terminal.remark(format_args!("{before} records are in the table already"));
     }
     let bar = terminal.steps(paths.len(), "files");
-    let reader = Reader { one, model: &model, quiet: &terminal.silent(), waiting: RefCell::default() };
+    let reader = Reader {
+        one,
+        model: &model,
+        quiet: &terminal.silent(),
+        waiting: RefCell::default(),
+        tried: RefCell::default(),
+    };
     // Names already in the table or queued for a fit; a record of the same name is not fitted again.
     let mut known: HashSet<Name> = table.rows().iter().map(|row| row.name.clone()).collect();
     let mut files: HashMap<String, u32> = HashMap::new();
@@ -74,8 +82,9 @@ pub fn run(one: &Fleet, terminal: &Terminal) -> Result<Verdict, Failure> {
             "{several} names stand in more than one file; the rows of each file are a record by themselves"
         ));
     }
-    table.finish()?;
-    terminal.remark(table.counts(before));
+    let counts = table.counts(before);
+    table.finish(&reader.tried.borrow())?;
+    terminal.remark(counts);
     if terminal.stopped() {
         terminal.remark("ended by Ctrl-C: the table has what was done; the same command goes on from there");
     }
@@ -86,13 +95,24 @@ pub fn run(one: &Fleet, terminal: &Terminal) -> Result<Verdict, Failure> {
     Ok(if terminal.stopped() { worst.max(Verdict::WithCare) } else { worst })
 }
 
-/// A hash of the model and the options, so that a journal of other ones is not continued.
-fn made_by(one: &Fleet) -> String {
+/// The files, each once, and how many are named again.
+fn distinct(named: Vec<PathBuf>) -> (Vec<PathBuf>, usize) {
+    let (count, mut known) = (named.len(), HashSet::new());
+    let is_new = |path: &PathBuf| known.insert(path.canonicalize().unwrap_or_else(|_| path.clone()));
+    let paths: Vec<PathBuf> = named.into_iter().filter(is_new).collect();
+    let again = count - paths.len();
+    (paths, again)
+}
+
+/// The options that are given and the text of the model, so that a table of other ones is not continued.
+fn made_by(one: &Fleet) -> Result<String, Failure> {
     let model = one.model.as_deref().unwrap_or_default();
-    let text = std::fs::read(model).unwrap_or_else(|_| model.into());
-    let mut hasher = DefaultHasher::new();
-    (text, format!("{:?}", (&one.of_model, &one.of_records, &one.of_fit))).hash(&mut hasher);
-    format!("{:016x}", hasher.finish())
+    let text = std::fs::read_to_string(model).or_else(|_| shipped(model).map(str::to_owned))?;
+    let options = format!("{:#?}", (&one.of_model, &one.of_records, &one.of_fit));
+    // Those that are not given are left out, so that one that a later version has changes nothing.
+    let is_given = |line: &&str| ![": [],", ": None,", ": false,"].iter().any(|end| line.ends_with(end));
+    let options: Vec<&str> = options.lines().filter(is_given).collect();
+    Ok(format!("{}\n\n{text}", options.join("\n")))
 }
 
 /// Reads files, and keeps the names of the records that are being fitted in their order.
@@ -102,17 +122,20 @@ struct Reader<'a> {
     quiet: &'a Terminal,
     /// Records in the order read. `Some(error)`: could not be read, so the fit gives no answer for it; `None`: an answer will come.
     waiting: RefCell<VecDeque<(Name, Option<String>)>>,
+    /// The files that were read.
+    tried: RefCell<HashSet<String>>,
 }
 
 impl Reader<'_> {
     /// The records of a file, or one error for all of it.
     fn read(&self, path: &Path) -> Vec<(Name, Result<Record, String>)> {
         let Fleet { of_model, of_records, by, .. } = self.one;
+        self.tried.borrow_mut().insert(path.to_string_lossy().into_owned());
         let Some(by) = by else {
-            let record = records::one(path, self.model, of_records, &of_model.initial, self.quiet);
+            let record = records::one(path, self.model, of_records, &of_model.values.initial, self.quiet);
             return vec![(name(path, None), record.map_err(|error| error.to_string()))];
         };
-        match records::groups(path, self.model, of_records, &of_model.initial, by) {
+        match records::groups(path, self.model, of_records, &of_model.values.initial, by) {
             Ok(groups) => {
                 // As the table has rows without a name.
                 let group = |group: String| Some(group).filter(|group| !group.is_empty());

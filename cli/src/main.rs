@@ -19,6 +19,7 @@ mod output;
 mod profile;
 mod project;
 mod records;
+mod remedies;
 mod residuals;
 mod shell;
 mod simulate;
@@ -83,7 +84,7 @@ fn main() -> ExitCode {
     match run(&arguments, &terminal) {
         Ok(verdict) => verdict.code(arguments.strict).into(),
         Err(error) => {
-            let text = error.to_string();
+            let text = remedies::in_shell(&error.to_string());
             // A mistake in a model file is shown with its place, after the same word.
             let word = if text.starts_with("error: ") { "" } else { "error: " };
             note(format_args!("{word}{text}"));

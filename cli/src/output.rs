@@ -1,12 +1,20 @@
 //! Results: files that are whole or not there, and standard output.
 
 use crate::Failure;
+use crate::remedies::in_shell;
+use greybox::Report;
 use std::io::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+
+/// What a report may be written as.
+pub const REPORTS: [&str; 4] = ["html", "md", "json", "txt"];
+/// What a record may be written as.
+pub const RECORDS: [&str; 2] = ["csv", "json"];
 
 /// Writes beside the file first and then renames, so that there is never half a file; without a path, to standard output.
 pub fn write(path: Option<&Path>, content: &[u8]) -> Result<(), Failure> {
     let Some(path) = path else { return print(content) };
+    let path = &target(path);
     let failed = |error: std::io::Error| format!("{}: {error}", path.display());
     // A pipe or a device is written to as it stands.
     if path.exists() && !path.is_file() {
@@ -20,6 +28,23 @@ pub fn write(path: Option<&Path>, content: &[u8]) -> Result<(), Failure> {
         let _ = std::fs::remove_file(&beside);
         failed(error)
     })?)
+}
+
+/// Where a path leads: a link stays a link, and what it leads to is written.
+pub fn target(path: &Path) -> PathBuf {
+    // What is not there yet, and a pipe, have no other path.
+    path.canonicalize().unwrap_or_else(|_| path.to_owned())
+}
+
+/// Writes a report as the path's ending says, one of [`REPORTS`].
+pub fn report(path: &Path, report: &Report) -> Result<(), Failure> {
+    let text = match ending(path).as_str() {
+        "html" => report.to_html(),
+        "md" => report.to_markdown(),
+        "json" => report.to_json()?,
+        _ => report.to_string(),
+    };
+    write(Some(path), text.as_bytes())
 }
 
 /// Checks before a fit that a file can be written after it: its folder is there, and its ending is one of these, if any are given.
@@ -47,9 +72,9 @@ pub fn print(content: &[u8]) -> Result<(), Failure> {
     }
 }
 
-/// Prints a text and ends its line.
+/// Prints a text, remedies in the words of the command line, and ends its line.
 pub fn line(text: impl std::fmt::Display) -> Result<(), Failure> {
-    print(format!("{}\n", text.to_string().trim_end()).as_bytes())
+    print(format!("{}\n", in_shell(text.to_string().trim_end())).as_bytes())
 }
 
 /// The ending of a path, in small letters.

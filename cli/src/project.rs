@@ -9,18 +9,19 @@
 //! report = "report.html"
 //! ```
 
+mod subject;
+
 use crate::arguments::Arguments;
-use clap::{CommandFactory, Parser};
+use clap::error::{ContextKind, ContextValue, ErrorKind};
+use clap::parser::ValueSource;
+use clap::{Arg, ArgAction, ArgMatches, Command, CommandFactory, Parser};
 use std::ffi::OsString;
 use std::path::Path;
-use toml::Value;
+use subject::Subject;
+use toml::{Table, Value};
 
 /// The file's name, in the current folder.
 const FILE: &str = "greybox.toml";
-
-/// Options that mean something else in these commands: those of a project are for `fit` and `fleet`.
-const OTHERS: [(&str, &str); 5] =
-    [("simulate", "noise"), ("simulate", "out"), ("convert", "out"), ("export", "out"), ("compare", "report")];
 
 /// Why there are no arguments.
 pub enum Refused {
@@ -30,103 +31,157 @@ pub enum Refused {
 
 /// The arguments of the command line, after those of the project file that its command takes.
 pub fn arguments(words: Vec<OsString>) -> Result<Arguments, Refused> {
-    let usage = |words: &[OsString]| Arguments::try_parse_from(words).map_err(Refused::Usage);
-    let path = Path::new(FILE);
-    if !path.is_file() {
-        return usage(&words);
-    }
-    let said = |text: String| Refused::Project(format!("{FILE}: {text}"));
-    let text = std::fs::read_to_string(path).map_err(|error| said(error.to_string()))?;
-    let table: toml::Table = text.parse().map_err(|error: toml::de::Error| said(error.to_string()))?;
     let command = Arguments::command();
-    if words.get(1).is_some_and(|word| word == "help") {
-        return usage(&words);
+    // Help, the version and what is wrong with the command line itself need no project.
+    let given = command.clone().try_get_matches_from(&words);
+    let given = given.map_err(|error| Refused::Usage(explained(error, &command)))?;
+    let words = with_project(&command, &given, words).map_err(|text| Refused::Project(format!("{FILE}: {text}")))?;
+    // The command line by itself is right: what is wrong now is of the file.
+    let of_file =
+        |error: clap::Error| format!("{FILE}: {}", error.to_string().trim_start_matches("error: ").trim_end());
+    Arguments::try_parse_from(words).map_err(|error| Refused::Project(of_file(error)))
+}
+
+/// The error of an option that only other commands have, which names them.
+fn explained(mut error: clap::Error, command: &Command) -> clap::Error {
+    let Some(ContextValue::String(said)) = error.get(ContextKind::InvalidArg) else { return error };
+    let named = said.trim_start_matches("--");
+    let has = |one: &&Command| one.get_arguments().any(|option| option.get_long() == Some(named));
+    let names: Vec<&str> = command.get_subcommands().filter(has).map(Command::get_name).collect();
+    if error.kind() == ErrorKind::UnknownArgument && !names.is_empty() {
+        let tip = format!("it has no meaning here; it is an option of {}", names.join(", "));
+        error.remove(ContextKind::SuggestedArg);
+        error.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![tip.into()]));
     }
-    let Some(at) = words.iter().position(|word| command.find_subcommand(word).is_some()) else { return usage(&words) };
-    let Some(subcommand) = command.find_subcommand(&words[at]) else { return usage(&words) };
-    let options: Vec<&str> = subcommand.get_arguments().filter_map(|option| option.get_long()).collect();
-    let takes_model = subcommand.get_positionals().any(|one| one.get_id() == "model");
-    // Its models and records are named by options; it takes the others.
-    if !takes_model && subcommand.get_name() != "compare" {
-        return usage(&words);
+    error
+}
+
+/// The words of the command line, with the options of the project before them, and its model and records behind.
+fn with_project(command: &Command, given: &ArgMatches, words: Vec<OsString>) -> Result<Vec<OsString>, String> {
+    let named = given.subcommand().and_then(|(name, given)| Some((command.find_subcommand(name)?, given)));
+    let Some((subcommand, given)) = named else { return Ok(words) };
+    // A comparison names its models by options; it takes the other options of a project.
+    let [takes_model, takes_records] =
+        ["model", "records"].map(|name| subcommand.get_positionals().any(|one| one.get_id() == name));
+    let Some(at) = words.iter().position(|word| word == subcommand.get_name()) else { return Ok(words) };
+    let Some(table) = (takes_model || takes_records).then(read).transpose()?.flatten() else { return Ok(words) };
+    let mut all = words[..=at].to_vec();
+    all.extend(options(command, subcommand, given, &table)?);
+    all.extend_from_slice(&words[at + 1..]);
+    // A model of the command line stands in the place of the file's model and records.
+    if takes_model
+        && !given.contains_id("model")
+        && let Some(model) = table.get("model")
+    {
+        let records = table.get("records").filter(|_| takes_records);
+        let records = records.map_or(Ok(vec![]), |records| listed("records", records))?;
+        all.extend(listed("model", model)?.into_iter().chain(records).map(OsString::from));
     }
-    let means_another = |key: &str| OTHERS.contains(&(subcommand.get_name(), key));
-    let (mut before, mut positionals) = (words[..=at].to_vec(), vec![]);
-    let known: Vec<&str> = command
-        .get_subcommands()
-        .flat_map(|subcommand| subcommand.get_arguments())
-        .filter_map(|option| option.get_long())
-        .chain(["model", "records", "strict", "quiet"])
-        .collect();
-    for (key, value) in &table {
-        let words = words_of(key, value).map_err(said)?;
-        match key.as_str() {
-            "model" | "records" => positionals.push((key.clone(), words)),
-            _ if options.contains(&key.as_str()) && !means_another(key) || key == "strict" || key == "quiet" => {
-                before.extend(words)
-            }
-            // An option of another command.
-            _ if known.contains(&key.as_str()) => {}
-            _ => return Err(said(format!("there is no option `{key}`; `greybox help fit` lists them"))),
+    Ok(all)
+}
+
+/// The entries of the file, if it is there.
+fn read() -> Result<Option<Table>, String> {
+    if !Path::new(FILE).is_file() {
+        return Ok(None);
+    }
+    let text = std::fs::read_to_string(FILE).map_err(|error| error.to_string())?;
+    text.parse().map(Some).map_err(|error: toml::de::Error| error.to_string())
+}
+
+/// The options of the project that a command takes, but for those about which the command line says something else.
+fn options(
+    command: &Command,
+    subcommand: &Command,
+    given: &ArgMatches,
+    table: &Table,
+) -> Result<Vec<OsString>, String> {
+    let said: Vec<Subject> = subcommand.get_arguments().flat_map(|option| said(option, given)).collect();
+    let own = || [subcommand, command].into_iter().flat_map(Command::get_arguments);
+    let mut words = vec![];
+    for (key, value) in table.iter().filter(|(key, _)| *key != "model" && *key != "records") {
+        let named = |option: &&Arg| option.get_long() == Some(key.as_str());
+        let mut all = own().chain(command.get_subcommands().flat_map(Command::get_arguments));
+        let Some(option) = all.find(named) else {
+            return Err(format!("there is no option `{key}`; `greybox help fit` lists them"));
+        };
+        let values = values(key, option, value)?;
+        if !own().any(|option| named(&option)) || is_for_another(subcommand.get_name(), key) {
+            continue;
         }
+        let kept = values.into_iter().filter(|value| {
+            let subject = Subject::new(option, value);
+            !said.iter().any(|said| said.meets(&subject))
+        });
+        words.extend(kept.map(|value| match takes_value(option) {
+            true => format!("--{key}={value}").into(),
+            false => format!("--{key}").into(),
+        }));
     }
-    before.extend_from_slice(&words[at + 1..]);
-    // Model and records of the command line stand in the place of the file's.
-    let given = usage(&before)?;
-    if model_of(&given) {
-        return Ok(given);
-    }
-    positionals.sort_by_key(|(key, _)| key != "model");
-    before.extend(positionals.into_iter().flat_map(|(_, words)| words));
-    usage(&before)
+    Ok(words)
 }
 
-/// Whether the command line names a model.
-fn model_of(arguments: &Arguments) -> bool {
-    use crate::arguments::Command;
-    match &arguments.command {
-        Command::Fit(one) => one.fitting.model.is_some(),
-        Command::Residuals(one) => one.fitting.model.is_some(),
-        Command::Profile(one) => one.refit.fitting.model.is_some(),
-        Command::Bootstrap(one) => one.refit.fitting.model.is_some(),
-        Command::Simulate(one) => one.model.is_some(),
-        Command::Fleet(one) => one.model.is_some(),
-        Command::Check(one) => one.model.is_some(),
-        Command::Convert(one) => one.model.is_some(),
-        Command::Export(one) => one.model.is_some(),
-        Command::Compare(_) | Command::New(_) | Command::Models(_) | Command::Completions(_) | Command::Man(_) => true,
+/// Whether an option of a project is for another command than this one, which has an option of the same name: results are for the
+/// command that they are of, and noise is what a fit knows of its records.
+fn is_for_another(command: &str, key: &str) -> bool {
+    match key {
+        "report" => command != "fit",
+        "out" => command != "fleet",
+        "noise" => command == "simulate",
+        _ => false,
     }
 }
 
-/// An entry as words of the command line.
-fn words_of(key: &str, value: &Value) -> Result<Vec<OsString>, String> {
+/// What the command line says by an option.
+fn said(option: &Arg, given: &ArgMatches) -> Vec<Subject> {
+    let id = option.get_id().as_str();
+    if option.get_long().is_none() || given.value_source(id) != Some(ValueSource::CommandLine) {
+        return vec![];
+    }
+    given.get_raw(id).into_iter().flatten().map(|value| Subject::new(option, &value.to_string_lossy())).collect()
+}
+
+fn takes_value(option: &Arg) -> bool {
+    option.get_action().takes_values()
+}
+
+/// The values that an entry gives an option; `true` gives one to an option that takes none.
+fn values(key: &str, option: &Arg, value: &Value) -> Result<Vec<String>, String> {
+    match value {
+        Value::Boolean(flag) if !takes_value(option) => Ok(flag.then(|| flag.to_string()).into_iter().collect()),
+        _ if !takes_value(option) => Err(format!("`{key}` is true or false; it takes no other value")),
+        Value::Boolean(flag) => Err(format!("`{key} = {flag}`: the option takes {}", kind(key, option))),
+        Value::Table(table) => {
+            let pair = |(name, value): (&String, &Value)| {
+                let parts = listed(key, value)?;
+                Ok(format!("{name}={}", parts.join(if key == "bounds" { ".." } else { "," })))
+            };
+            table.iter().map(pair).collect()
+        }
+        value => listed(key, value),
+    }
+}
+
+/// What an option takes, as the file has it.
+fn kind(key: &str, option: &Arg) -> String {
+    let value = option.get_value_names().and_then(|names| names.first()).map_or("VALUE", |name| name.as_str());
+    match value.split_once('=') {
+        Some((name, value)) => format!("values by name: {key} = {{ {name} = \"{value}\" }}"),
+        None if matches!(option.get_action(), ArgAction::Append) => format!("names: {key} = [\"{value}\"]"),
+        None => format!("a value: {key} = \"{value}\""),
+    }
+}
+
+/// The texts and numbers of a list, or the one that there is instead.
+fn listed(key: &str, value: &Value) -> Result<Vec<String>, String> {
     let plain = |value: &Value| match value {
         Value::String(text) => Ok(text.clone()),
         Value::Integer(number) => Ok(number.to_string()),
         Value::Float(number) => Ok(number.to_string()),
         other => Err(format!("`{key}`: a {} does not belong here", other.type_str())),
     };
-    let positional = key == "model" || key == "records";
-    let word = |text: String| {
-        if positional { OsString::from(text) } else { OsString::from(format!("--{key}={text}")) }
-    };
     match value {
-        Value::Boolean(true) => Ok(vec![format!("--{key}").into()]),
-        Value::Boolean(false) => Ok(vec![]),
-        Value::Array(values) => values.iter().map(|value| plain(value).map(word)).collect(),
-        Value::Table(table) => {
-            let pair = |(name, value): (&String, &Value)| {
-                let text = match value {
-                    Value::Array(parts) => {
-                        let parts = parts.iter().map(plain).collect::<Result<Vec<_>, _>>()?;
-                        parts.join(if key == "bounds" { ".." } else { "," })
-                    }
-                    value => plain(value)?,
-                };
-                Ok(word(format!("{name}={text}")))
-            };
-            table.iter().map(pair).collect()
-        }
-        value => Ok(vec![word(plain(value)?)]),
+        Value::Array(values) => values.iter().map(plain).collect(),
+        value => Ok(vec![plain(value)?]),
     }
 }

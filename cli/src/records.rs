@@ -5,7 +5,7 @@ use crate::arguments::{Order, RecordOptions};
 use crate::fitting::{expanded, initial, number, range};
 use crate::terminal::Terminal;
 use greybox::layout::Layout;
-use greybox::record::Record;
+use greybox::record::{Initial, Record};
 use greybox::text::{self, Model};
 use greybox::{DataFile, DateOrder, Hold};
 use std::path::{Path, PathBuf};
@@ -30,10 +30,10 @@ pub fn one(
     terminal: &Terminal,
 ) -> Result<Record, Failure> {
     let layout = model.equations().layout();
-    prepared(read(path, layout, options, terminal)?, model, options, of_initial)
+    prepared(read(path, model, layout, options, terminal)?, model, options, of_initial)
 }
 
-/// Reads the inputs alone, of a model that has any.
+/// Reads the inputs alone, of a model that has any, and outputs from whose first sample the initial state is to be taken.
 pub fn inputs(
     path: &Path,
     model: &Model,
@@ -45,7 +45,11 @@ pub fn inputs(
     if !layout.inputs.is_empty() {
         layout.outputs = vec![];
     }
-    prepared(read(path, &layout, options, terminal)?, model, options, of_initial)
+    let inputs = prepared(read(path, model, &layout, options, terminal)?, model, options, of_initial)?;
+    match inputs.initial_state() {
+        Initial::FirstSample if layout.outputs.is_empty() => one(path, model, options, of_initial, terminal),
+        _ => Ok(inputs),
+    }
 }
 
 /// The record with what is declared of its inputs and of the initial state, and the part of it that is used.
@@ -57,13 +61,8 @@ fn prepared(record: Record, model: &Model, options: &RecordOptions, of_initial: 
         Some(said) => record.initial(said)?,
         None => record,
     };
-    for (input, hold) in &options.hold {
-        let hold = match hold.as_str() {
-            "zero" => Hold::Zero,
-            "first" => Hold::First,
-            other => return Err(format!("--hold {input}: `{other}` is none; there are zero and first").into()),
-        };
-        record = record.hold_of(input, hold)?;
+    for (input, text) in &options.hold {
+        record = record.hold_of(input, hold(input, text)?)?;
     }
     if let Some(text) = &options.between {
         let (from, to) = range("--between", text)?;
@@ -73,6 +72,14 @@ fn prepared(record: Record, model: &Model, options: &RecordOptions, of_initial: 
         Some(n) => record.decimate(n)?,
         None => record,
     })
+}
+
+fn hold(input: &str, text: &str) -> Result<Hold, Failure> {
+    match text {
+        "zero" => Ok(Hold::Zero),
+        "first" => Ok(Hold::First),
+        other => Err(format!("--hold {input}: `{other}` is none; there are zero and first").into()),
+    }
 }
 
 /// The name of a record of a file, and the record or why there is none.
@@ -91,13 +98,19 @@ pub fn groups(
         prepared(record.map_err(|error| error.to_string())?, model, options, of_initial)
             .map_err(|error| error.to_string())
     };
-    let groups = file(path, layout, options)?.read_groups(layout, by)?;
+    let groups = file(path, model, layout, options)?.read_groups(layout, by)?;
     Ok(groups.into_iter().map(|(name, found)| (name, record(found))).collect())
 }
 
 /// Reads the columns of a layout.
-fn read(path: &Path, layout: &Layout, options: &RecordOptions, terminal: &Terminal) -> Result<Record, Failure> {
-    let record = file(path, layout, options)?.read_record(layout)?;
+fn read(
+    path: &Path,
+    model: &Model,
+    layout: &Layout,
+    options: &RecordOptions,
+    terminal: &Terminal,
+) -> Result<Record, Failure> {
+    let record = file(path, model, layout, options)?.read_record(layout)?;
     if let Some(reading) = record.reading() {
         terminal.remark(format_args!("{}: {reading}", path.display()));
     }
@@ -105,8 +118,14 @@ fn read(path: &Path, layout: &Layout, options: &RecordOptions, terminal: &Termin
 }
 
 /// A file with what the command line says of it.
-fn file(path: &Path, layout: &Layout, options: &RecordOptions) -> Result<DataFile, Failure> {
+fn file(path: &Path, model: &Model, layout: &Layout, options: &RecordOptions) -> Result<DataFile, Failure> {
     let mut file = DataFile::new(path);
+    for input in &options.fill {
+        let said = options.hold.iter().rfind(|(name, _)| name == input).map(|(name, text)| hold(name, text));
+        let at = layout.inputs.iter().position(|quantity| quantity.name == *input);
+        let declared = at.and_then(|at| model.holds()[at]);
+        file = file.fill(input, said.transpose()?.or(declared).unwrap_or_default());
+    }
     for (signal, column) in &options.column {
         file = file.column(signal, column);
     }
@@ -120,6 +139,12 @@ fn file(path: &Path, layout: &Layout, options: &RecordOptions) -> Result<DataFil
         file = file.factor("t", text::factor(unit, "s")?);
     }
     if let Some(step) = options.sample_time {
+        if let Some((_, column)) = options.column.iter().find(|(signal, _)| signal == "t") {
+            return Err(format!(
+                "--sample-time {step}: --column t={column} gives the time, too; leave one of them out"
+            )
+            .into());
+        }
         file = file.sample_time(step);
     }
     if let Some(order) = options.date_order {

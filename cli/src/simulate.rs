@@ -1,26 +1,29 @@
 //! `simulate`: what a model does with given parameters and the inputs of a record.
 
-use crate::arguments::Simulate;
+use crate::arguments::{ModelOptions, Simulate};
 use crate::fitting::{declared, estimate, model, numbers};
 use crate::terminal::Terminal;
-use crate::{Failure, Verdict, convert, records};
+use crate::{Failure, Verdict, convert, output, records};
 use greybox::layout::Layout;
 use greybox::record::Record;
-use greybox::{Fleet, fixed};
+use greybox::{Fleet, Summary, fixed};
 
 pub fn run(one: &Simulate, terminal: &Terminal) -> Result<Verdict, Failure> {
+    output::check(one.out.as_deref(), &output::RECORDS)?;
     let model = model(one.model.as_deref(), &one.of_model.constant, terminal)?;
     let layout = model.equations().layout();
-    let [path] = &one.records[..] else { return Err("name one file with the inputs, after the model".into()) };
+    let path = convert::only(&one.records, "file with the inputs")?;
     // Outputs need not be in the file.
-    let inputs = records::inputs(path, &model, &one.of_records, &one.of_model.initial, terminal)?;
-    let mut parameters = declared(&model, &one.of_model)?;
+    let inputs = records::inputs(&path, &model, &one.of_records, &one.of_model.initial, terminal)?;
+    let options = ModelOptions { values: one.of_model.clone(), ..Default::default() };
+    let mut parameters = declared(&model, &options)?;
     let mut initial = None;
     if let Some(path) = &one.estimate {
         let found = estimate(path)?;
         if found.layout.parameters != layout.parameters {
             return Err(format!("{}: the estimate is of a model with other parameters", path.display()).into());
         }
+        let found = of_record(found, &inputs)?;
         // What the command line sets is kept.
         let said = |name: &str| one.of_model.set.iter().chain(&one.of_model.fix).any(|(known, _)| known == name);
         for (parameter, found) in parameters.iter_mut().zip(&found.parameters) {
@@ -48,13 +51,41 @@ pub fn run(one: &Simulate, terminal: &Terminal) -> Result<Verdict, Failure> {
     Ok(Verdict::Usable)
 }
 
+/// The estimate for a record: of several of the fit, for that of its name.
+fn of_record(estimate: Summary, record: &Record) -> Result<Summary, Failure> {
+    let at = estimate.experiments.iter().position(|experiment| experiment.name == record.name());
+    if let Some(own) = at.and_then(|at| estimate.of_experiment(at)) {
+        return Ok(own);
+    }
+    match estimate.own_parameters().first() {
+        Some(parameter) if estimate.experiments.len() > 1 => {
+            let names: Vec<&str> = estimate.experiments.iter().map(|experiment| experiment.name.as_str()).collect();
+            Err(format!(
+                "`{}` has a value for each record of the estimate ({}), and {} is none of them: say it by --set",
+                estimate.parameters[*parameter].name,
+                names.join(", "),
+                record.name()
+            )
+            .into())
+        }
+        _ => Ok(estimate),
+    }
+}
+
 fn noisy(record: &Record, layout: &Layout, noise: &[(String, f64)], seed: u64) -> Result<Record, Failure> {
     let mut sigma = vec![0.0; layout.outputs.len()];
     for (name, value) in noise {
         let at = layout.outputs.iter().position(|output| output.name == *name);
         let available = || layout.outputs.iter().map(|output| output.name.clone()).collect();
         let unknown = || greybox::Error::Unknown { what: "output".into(), name: name.clone(), available: available() };
-        sigma[at.ok_or_else(unknown)?] = *value;
+        let at = at.ok_or_else(unknown)?;
+        if *value < 0.0 {
+            return Err(format!(
+                "--noise {name}: {value} is no standard deviation; give a positive number, or 0 for none"
+            )
+            .into());
+        }
+        sigma[at] = *value;
     }
     Ok(record.with_noise(&sigma, seed))
 }

@@ -118,7 +118,7 @@ class Estimate:
             raise Error(f"`{name}` has no interval of probability {probability!r}; the printed fit says what is known of it")
         return found
 
-    def derived(self, name: str, function: Callable[[Vector], Any]) -> Derived:
+    def derived(self, name: str, function: Callable[[Vector], Any], record: str | None = None) -> Derived:
         """Compute a function of the parameters, with the interval that their covariance gives it.
 
         Parameters
@@ -127,8 +127,20 @@ class Estimate:
             What it is called.
         function : callable
             Of the vector of parameters: ``lambda p: p.ls / p.rs``. It is read with symbols, as a model is.
+        record : str, optional
+            The name of the record whose parameters they are, where each has its own.
+
+        Raises
+        ------
+        Error
+            Where each record has parameters of its own, and no record of the fit is named.
         """
-        value, error, interval = self._estimate.derived(name, of_parameters(self._equations, function))
+        names = [row[0] for row in self._estimate.experiments]
+        own = [self._estimate.parameters[j][0] for j in self._estimate.own_parameters]
+        if own and len(names) > 1 and record not in names:
+            raise Error(f"`{own[0]}` has a value for each record: say which by record=; there are {', '.join(names)}")
+        at = names.index(record) if record in names else 0
+        value, error, interval = self._estimate.derived(at, name, of_parameters(self._equations, function))
         lower, upper = interval or (float("nan"), float("nan"))
         return Derived(name, value, _number(error), lower, upper)
 
@@ -139,7 +151,9 @@ class Estimate:
 
     def table(self) -> Any:
         """Give a frame of the caller's kind with a row for each parameter and free initial state."""
-        rows = list(self._estimate.parameters)
+        # Of parameters that each record has for itself, the unknowns have a row for each.
+        own = set(self._estimate.own_parameters)
+        rows = [row for j, row in enumerate(self._estimate.parameters) if j not in own]
         known = {row[0] for row in rows}
         rows += [row for row in self._estimate.unknowns if row[0] not in known]
         return self._kind(

@@ -1,5 +1,6 @@
 //! Errors of the library as the package's exception, and names as the library's enumerations.
 
+use crate::remedies::in_python;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
@@ -12,7 +13,7 @@ use std::fmt::Display;
 /// The exception `greybox.Error` with a sentence of the library.
 pub fn raised(error: impl Display) -> PyErr {
     static CLASS: PyOnceLock<Py<PyType>> = PyOnceLock::new();
-    let text = error.to_string();
+    let text = in_python(&error.to_string());
     Python::attach(|py| match CLASS.import(py, "greybox.errors", "Error") {
         Ok(class) => PyErr::from_type(class.clone(), text),
         Err(_) => PyValueError::new_err(text),

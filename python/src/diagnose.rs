@@ -1,6 +1,7 @@
 //! [`Report`]: an estimate as something to read.
 
 use crate::convert::{name_of, raised};
+use crate::remedies::in_python;
 use greybox::diagnose::{Bootstrap, Profile};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
@@ -70,7 +71,7 @@ impl Report {
     }
 
     fn __str__(&self) -> String {
-        self.0.to_string()
+        in_python(&self.0.to_string())
     }
 
     /// Writes the report, whole or not at all, as the path ends in `.html`, `.md`, `.json` or `.txt`.

@@ -2,6 +2,7 @@
 
 use crate::convert::{name_of, raised};
 use crate::graph::Expression;
+use crate::remedies::in_python;
 use greybox::Knowledge;
 use greybox::diagnose::derived_by;
 use numpy::PyArray2;
@@ -43,7 +44,7 @@ impl Estimate {
     }
 
     fn __str__(&self) -> String {
-        self.0.to_string()
+        in_python(&self.0.to_string())
     }
 
     /// `usable`, `usable_with_care` or `not_usable`.
@@ -54,16 +55,16 @@ impl Estimate {
 
     /// How the search ended: its code, whether that is a minimum, in words, and the advice.
     #[getter]
-    fn outcome(&self) -> (String, bool, String, &'static str) {
+    fn outcome(&self) -> (String, bool, String, String) {
         let outcome = self.0.outcome;
-        (name_of(outcome), outcome.converged(), outcome.to_string(), outcome.advice())
+        (name_of(outcome), outcome.converged(), outcome.to_string(), in_python(outcome.advice()))
     }
 
     /// Code, severity and text of each.
     #[getter]
     fn warnings(&self) -> Vec<(String, String, String)> {
         let all = self.0.warnings.iter();
-        all.map(|one| (name_of(one.code), name_of(one.severity), one.text.clone())).collect()
+        all.map(|one| (name_of(one.code), name_of(one.severity), in_python(&one.text))).collect()
     }
 
     /// The parameters, fixed ones too.
@@ -109,12 +110,19 @@ impl Estimate {
 
     /// Interval of an unknown with this probability.
     fn interval(&self, name: &str, probability: f64) -> Option<(f64, f64)> {
-        self.0.interval(name, probability)
+        let held = || self.0.unknowns.iter().find(|unknown| unknown.name == name && probability == 0.95);
+        self.0.interval(name, probability).or_else(|| interval(&held()?.knowledge))
     }
 
-    /// Value, standard error and interval of a function of the parameters.
-    fn derived(&self, name: &str, expression: &Expression) -> (f64, Option<f64>, Option<(f64, f64)>) {
-        let found = derived_by(&self.0, name, &expression.graph, expression.root);
+    /// The places of the parameters that each record has for itself.
+    #[getter]
+    fn own_parameters(&self) -> Vec<usize> {
+        self.0.own_parameters()
+    }
+
+    /// Value, standard error and interval of a function of the parameters, of those of one record where each has its own.
+    fn derived(&self, record: usize, name: &str, expression: &Expression) -> (f64, Option<f64>, Option<(f64, f64)>) {
+        let found = derived_by(&self.0, record, name, &expression.graph, expression.root);
         (found.value, found.standard_error, found.interval)
     }
 

@@ -4,6 +4,7 @@ use crate::convert::raised;
 use crate::equations::Equations;
 use crate::estimate::Estimate;
 use crate::record::Record;
+use crate::remedies::in_python;
 use crate::run::{Progress, interruptible};
 use crate::settings::{Options, Parameter};
 use pyo3::prelude::*;
@@ -35,7 +36,7 @@ pub fn fleet(
     }
     let answer = |one: Result<greybox::Summary, greybox::Error>| match one {
         Ok(summary) => (Some(Estimate(summary)), None),
-        Err(error) => (None, Some(error.to_string())),
+        Err(error) => (None, Some(in_python(&error.to_string()))),
     };
     Ok(ended.result.into_iter().map(answer).collect())
 }

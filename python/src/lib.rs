@@ -10,6 +10,7 @@ mod fleet;
 mod graph;
 mod problem;
 mod record;
+mod remedies;
 mod run;
 mod settings;
 mod text;

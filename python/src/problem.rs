@@ -167,8 +167,7 @@ fn of_record(
     if let Some(one) = own.and_then(|own| estimate.0.experiments.get(own)) {
         let initial = one.initial_state.iter().copied().map(greybox::fixed).collect();
         record = record.initial(greybox::record::Initial::Given(initial)).map_err(raised)?;
-        let values = one.parameters.iter();
-        summary.parameters.iter_mut().zip(values).for_each(|(parameter, value)| parameter.value = *value);
+        summary = own.and_then(|own| summary.of_experiment(own)).unwrap_or(summary);
     }
     Ok((summary, record))
 }

@@ -86,6 +86,23 @@ def test_several_records_and_their_own_parameters() -> None:
     assert frame["record"].unique().tolist() == ["cold", "warm"] and len(frame) == 400
     assert np.allclose(frame["body"] - frame["body_predicted"], frame["body_residual"], atol=0)
     assert frame["body_residual"].std() == pytest.approx(0.05, rel=0.1)
+    # Of a frame nobody knows which of the two it is; a record of the name of one has its parameter.
+    named = found.residuals(warm)["body"]
+    assert float(np.std(np.asarray(named))) == pytest.approx(0.05, rel=0.1)
+    with pytest.raises(gb.Error, match="a value for each record of the fit, and this is none of them \\(cold, warm\\)"):
+        found.predict(cooled(k=0.5, seed=2))
+    with pytest.raises(gb.Error, match="say which by record="):
+        found.derived("tau", lambda p: 1 / p.k)
+    assert found.derived("tau", lambda p: 1 / p.k, record="warm").value == pytest.approx(1 / values[1], rel=1e-12)
+    names = set(pd.DataFrame(found.table())["name"])
+    assert {"k [cold]", "k [warm]"} <= names and "k" not in names
+
+
+def test_remedies_are_arguments() -> None:
+    c = cooled()
+    c["room"] = np.where(c["t"] < 5, np.nan, c["room"])
+    with pytest.raises(gb.Error, match=r"an input that has a rate of its own \(gb.align\)"):
+        gb.fit(cooling(), c, k=gb.free(1.0))
 
 
 def test_derived(fitted: gb.Fit) -> None:

@@ -51,10 +51,11 @@ pub fn derived<M: Model>(
     name: &str,
     f: impl Fn(&Of<M::Parameters, Dual<LANES>>) -> Dual<LANES>,
 ) -> Derived {
-    of(estimate, name, &|p| f(&M::Parameters::from_fn(|j| p[j])))
+    of(estimate, 0, name, &|p| f(&M::Parameters::from_fn(|j| p[j])))
 }
 
-/// The derived quantity at the root of a graph of parameters: `tau` of [`Leaf::Parameter`] one over zero. Other leaves are not numbers.
+/// The derived quantity at the root of a graph of parameters: `tau` of [`Leaf::Parameter`] one over zero. Other leaves are not numbers. Parameters that each
+/// experiment has for itself are those of `experiment`, by its place.
 ///
 /// ```
 /// # use greybox::{Experiment, Fit, diagnose, free, pmsm::{Surface, Winding}};
@@ -67,14 +68,14 @@ pub fn derived<M: Model>(
 /// let mut graph = Graph::default();
 /// let [rs, ls] = [0, 1].map(|j| graph.leaf(Leaf::Parameter(j)));
 /// let tau = graph.div(ls, rs);
-/// let tau = diagnose::derived_by(&estimate, "tau", &graph, tau);
+/// let tau = diagnose::derived_by(&estimate, 0, "tau", &graph, tau);
 /// assert_eq!(tau, diagnose::derived(&estimate, "tau", |p| p.ls / p.rs));
 /// # Ok(())
 /// # }
 /// ```
-pub fn derived_by(estimate: &Summary, name: &str, graph: &Graph, root: Id) -> Derived {
+pub fn derived_by(estimate: &Summary, experiment: usize, name: &str, graph: &Graph, root: Id) -> Derived {
     let unknown = Dual::from(f64::NAN);
-    of(estimate, name, &|p| {
+    of(estimate, experiment, name, &|p| {
         let leaf = |leaf| match leaf {
             Leaf::Parameter(j) => p.get(j as usize).copied().unwrap_or(unknown),
             _ => unknown,
@@ -83,11 +84,12 @@ pub fn derived_by(estimate: &Summary, name: &str, graph: &Graph, root: Id) -> De
     })
 }
 
-fn of(estimate: &Summary, name: &str, f: &dyn Fn(&[Dual<LANES>]) -> Dual<LANES>) -> Derived {
-    let values: Vec<f64> = estimate.parameters.iter().map(|parameter| parameter.value).collect();
+fn of(estimate: &Summary, experiment: usize, name: &str, f: &dyn Fn(&[Dual<LANES>]) -> Dual<LANES>) -> Derived {
+    let of_all = || estimate.parameters.iter().map(|parameter| parameter.value).collect();
+    let values: Vec<f64> = estimate.experiments.get(experiment).map_or_else(of_all, |own| own.parameters.clone());
     let unknown = |j: usize| {
-        let first = |u: &Unknown| u.role == Role::Parameter(j) && u.experiment.is_none_or(|e| e == 0);
-        estimate.unknowns.iter().position(first)
+        let own = |u: &Unknown| u.role == Role::Parameter(j) && u.experiment.is_none_or(|e| e == experiment);
+        estimate.unknowns.iter().position(own)
     };
     let parameters = values.len();
     let mut gradient = vec![0.0; estimate.unknowns.len()];

@@ -23,7 +23,7 @@ pub(super) fn asked<'a, T>(
     estimate: &Summary,
     ask: impl FnOnce(&Objective<'_>, &[f64]) -> Result<T, Error>,
 ) -> Result<T, Error> {
-    let parameters: Vec<_> = estimate.parameters.iter().map(|parameter| fixed(parameter.value)).collect();
+    let parameters = values(estimate, record)?.into_iter().map(fixed).collect::<Vec<_>>();
     // An output without any error gives no noise level; it is then estimated from this record.
     let sigma = estimate.sigma();
     let noisy = sigma.iter().all(|sigma| *sigma > 0.0);
@@ -41,12 +41,30 @@ pub(super) fn asked<'a, T>(
     ask(&objective, &coordinates)
 }
 
+/// The parameters of an estimate for a record. Of parameters that each experiment of the fit has for itself, those of the experiment of its name.
+fn values(estimate: &Summary, record: &Record) -> Result<Vec<f64>, Error> {
+    let own = estimate.own_parameters();
+    let of_all = || estimate.parameters.iter().map(|parameter| parameter.value).collect();
+    let Some(first) = own.first().filter(|_| estimate.experiments.len() > 1) else { return Ok(of_all()) };
+    match estimate.experiments.iter().find(|experiment| experiment.name == record.name()) {
+        Some(experiment) => Ok(experiment.parameters.clone()),
+        None => Err(Error::Option(format!(
+            "experiment `{}`: parameter `{}` has a value for each record of the fit, and this is none of them ({}); give it the name of the one \
+             whose values it has",
+            record.name(),
+            estimate.parameters[*first].name,
+            estimate.experiments.iter().map(|experiment| experiment.name.as_str()).collect::<Vec<_>>().join(", ")
+        ))),
+    }
+}
+
 impl<M: Model> Fit<'_, M> {
     /// Predicts a record by an estimate, with the integrator and the predictor of this fit; the fit's own records,
-    /// parameters and other settings are not used. Free initial states are estimated from the record.
+    /// parameters and other settings are not used. Free initial states are estimated from the record. Parameters that each experiment of the fit had for
+    /// itself are those of the experiment of the record's name.
     ///
     /// # Errors
-    /// As [`run`](Fit::run), and a simulation that fails.
+    /// As [`run`](Fit::run), and a simulation that fails; a record that is none of the fit, where each had parameters for itself.
     pub fn predict(&self, estimate: &Estimate<M>, record: &ExperimentOf<M>) -> Result<Prediction<M>, Error> {
         let sweep = self.sweep_of(estimate)?;
         let found = asked(sweep, record.record(), estimate, |objective, at| objective.predict(0, at))?;
@@ -121,9 +139,7 @@ impl<M: Model> Estimate<M> {
     ) -> Option<Result<Prediction<M>, Error>> {
         let own = self.experiments.get(experiment)?;
         let record = record.clone().initial(M::State::map(own.initial_state, fixed));
-        let mut summary = self.summary().clone();
-        let values = M::Parameters::into_array(own.parameters);
-        summary.parameters.iter_mut().zip(values).for_each(|(parameter, value)| parameter.value = value);
+        let summary = self.summary().of_experiment(experiment)?;
         Some(Estimate::of(summary).and_then(|own| own.predict(model, &record)))
     }
 }

@@ -56,8 +56,9 @@ impl Problem<'_> {
 
     fn run_from(&self, start: Start, begin: Instant, control: &Control) -> Result<Summary, Error> {
         match self.run_within(begin, control, start.clone()) {
-            // Stages that were stopped leave no time to evaluate their end, which is the best point so far.
-            Err(_) if self.settings.lead != Lead::Declared && control.stops() => {
+            // Stages that were stopped leave no time to evaluate their end, which is the best point so far; the first evaluation of many starts, which is
+            // one for all, may take longer than the limit.
+            Err(_) if self.takes_long_to_begin() && control.stops() => {
                 let settings = Settings { searches: SearchPlan::Single, ..self.settings.clone() };
                 let problem = Problem { settings, ..self.clone() };
                 let found = problem.run_within(begin, &NEVER, Start { trials: 1, ..start })?;
@@ -65,6 +66,10 @@ impl Problem<'_> {
             }
             found => found,
         }
+    }
+
+    fn takes_long_to_begin(&self) -> bool {
+        self.settings.lead != Lead::Declared || self.settings.searches.count() > 1
     }
 
     /// The estimate by a method, numbered as in [`by_method`](Self::by_method), or by a finer one, as long as a finer step would

@@ -19,33 +19,41 @@ impl Fit<'_, Equations> {
     /// Other inputs or states than the equations have, an initial state that is not finite; a simulation that fails.
     pub fn simulate(&self, initial: &[f64], inputs: &Record) -> Result<Record, Error> {
         let given = Initial::Given(initial.iter().copied().map(fixed).collect());
-        let problem = self.of_inputs(inputs, 0.0, given)?;
+        let outputs = vec![vec![0.0; inputs.len()]; self.model.layout().outputs.len()];
+        let problem = self.of_inputs(inputs, outputs, given)?;
         let outputs = problem.in_units(&Control::NEVER).predict(0, &[])?.outputs;
         with_outputs(self.model.layout(), inputs, outputs)
     }
 
     /// The state at the first sample of a record of inputs, as that declares it ([`Initial`]) or the model says it, with the starts of the parameters;
-    /// zero of a state that neither says.
+    /// zero of a state that neither says. From the first sample ([`Initial::FirstSample`]) it is taken by the outputs that the record has.
     ///
     /// # Errors
-    /// As [`simulate`](Self::simulate); a plant that does not rest where the record begins at rest.
+    /// As [`simulate`](Self::simulate); a plant that does not rest where the record begins at rest; outputs from which the state does not follow.
     pub fn initial_state(&self, inputs: &Record) -> Result<Vec<f64>, Error> {
         let zero = vec![0.0; self.model.layout().states.len()];
         let initial = match inputs.initial_state() {
             Initial::Given(given) => return Ok(given.iter().map(|state| state.start).collect()),
-            Initial::Free | Initial::FirstSample => return Ok(zero),
+            Initial::Free => return Ok(zero),
             initial => initial.clone(),
         };
-        let problem = self.of_inputs(inputs, f64::NAN, initial)?;
+        let first = initial == Initial::FirstSample;
+        // Of outputs that the record lacks nothing is measured.
+        let measured = |of: &Quantity| inputs.outputs().iter().find(|channel| first && channel.name == of.name);
+        let of = |of: &Quantity| measured(of).map_or(vec![f64::NAN; inputs.len()], |channel| channel.values.to_vec());
+        let outputs = self.model.layout().outputs.iter().map(of).collect();
+        let problem = self.of_inputs(inputs, outputs, initial)?;
         let start = problem.unknowns.start();
         let values = problem.in_units(&Control::NEVER).values_of(0, &start);
+        if first {
+            return Ok(values.x);
+        }
         let follows = problem.sweep.follows(&problem.records[0], &values.p);
         Ok(values.x.into_iter().zip(follows).map(|(x, follows)| if follows { x } else { 0.0 }).collect())
     }
 
-    /// The problem of a record of inputs, whose outputs are this number throughout.
-    fn of_inputs(&self, inputs: &Record, output: f64, initial: Initial) -> Result<Problem<'_>, Error> {
-        let outputs = vec![vec![output; inputs.len()]; self.model.layout().outputs.len()];
+    /// The problem of a record of inputs with these outputs.
+    fn of_inputs(&self, inputs: &Record, outputs: Vec<Vec<f64>>, initial: Initial) -> Result<Problem<'_>, Error> {
         let record = with_outputs(self.model.layout(), inputs, outputs)?.initial(initial)?;
         let parameters: Vec<Parameter> = self.parameters.iter().map(|parameter| fixed(parameter.start)).collect();
         let sweep = Equations::sweep(self.model.lent(), self.stepping.as_ref(), None)?;

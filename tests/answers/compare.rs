@@ -2,8 +2,10 @@
 
 use crate::random::Random;
 use greybox::diagnose::{
-    Candidate, Resampling, Test, bootstrap, cross_validate, derived, drift, f_test, likelihood_ratio, tested, validate,
+    Candidate, Resampling, Test, bootstrap, cross_validate, derived, derived_by, drift, f_test, likelihood_ratio,
+    tested, validate,
 };
+use greybox::graph::{Graph, Leaf};
 use greybox::{
     Error, Estimate, Experiment, Fit, Kind, Model, Nothing, Parameter, Scalar, Severity, Summary, Time, fixed, free,
     signals,
@@ -125,6 +127,33 @@ fn an_experiment_of_the_fit_is_predicted_with_its_own_parameters() {
         assert!((own.quality.y.rmse / 0.1 - 1.0).abs() < 0.4, "{:?}", own.quality);
     }
     assert!(estimate.predict_own(&Polynomial, &records[0], 2).is_none());
+}
+
+/// A record of the fit is known by its name; of another, nobody knows whose parameters it has.
+#[test]
+fn a_record_has_the_parameters_of_the_experiment_of_its_name() {
+    let records = [record(3, 2.0, 0.4).named("cold"), record(4, 5.0, 0.4).named("warm")];
+    let parameters = Cubic { a: free(0.0), b: free(0.0).per_experiment(), c: free(0.1) };
+    let problem = Fit::new(&Polynomial, &records).parameters(parameters).problem().unwrap();
+    let estimate = Fit::new(&Polynomial, &records).parameters(parameters).run().unwrap();
+    for (k, record) in records.iter().enumerate() {
+        let own = estimate.predict_own(&Polynomial, record, k).unwrap().unwrap();
+        assert_eq!(estimate.predict(&Polynomial, record).unwrap().outputs, own.outputs);
+        let untyped = problem.predict(estimate.summary(), record.record()).unwrap();
+        assert!(untyped.outputs[0].iter().zip(&own.outputs).all(|(one, typed)| *one == typed.y));
+    }
+    let error = estimate.predict(&Polynomial, &record(5, 2.0, 0.4)).map(|_| ()).unwrap_err().to_string();
+    assert!(["`record 5`", "`b`", "(cold, warm)"].iter().all(|part| error.contains(part)), "{error}");
+    // The slope of `b` is one: value and error are those of the second.
+    let mut graph = Graph::default();
+    let b = graph.leaf(Leaf::Parameter(1));
+    let second = derived_by(estimate.summary(), 1, "b", &graph, b);
+    let of = estimate.unknowns.iter().position(|unknown| unknown.experiment == Some(1)).unwrap();
+    assert_eq!(second.value, estimate.experiments[1].parameters.b);
+    assert!(
+        (second.standard_error.unwrap() / estimate.covariance.standard_error(of) - 1.0).abs() < 1e-12,
+        "{second:?}"
+    );
 }
 
 /// Refits of resampled residuals scatter as the standard errors of a model that is linear say: of 400 to 3.5 %, here four times

@@ -16,8 +16,17 @@ pub struct Journal {
 /// A row as JSON has it. Numbers are texts: JSON has none that is infinite.
 type Line = (String, Option<String>, String, Vec<Option<String>>, String);
 
+/// The row of a line; `None` if it is none.
+fn row(line: &[u8]) -> Option<Row> {
+    let (record, group, verdict, numbers, remarks) = serde_json::from_slice::<Line>(line).ok()?;
+    let number = |text: Option<String>| text.map(|text| text.parse()).transpose().ok();
+    let numbers = numbers.into_iter().map(number).collect::<Option<_>>()?;
+    Some(Row { name: Name { record, group }, verdict, numbers, remarks })
+}
+
 impl Journal {
-    /// Opens the journal, and reads the rows that an earlier run left there.
+    /// Opens the journal, and reads the rows that an earlier run left there. What something else has made that is nothing but errors is begun
+    /// anew.
     ///
     /// # Errors
     /// A file that cannot be written; one of another table, or of rows that were made by something else; one that another process writes.
@@ -38,22 +47,21 @@ impl Journal {
         let of = |what: &str| format!("{}: it is of {what}; remove it, or name another table", path.display());
         let other = || of("another table");
         let mut lines = bytes[..whole].split_inclusive(|byte| *byte == b'\n');
-        match lines.next() {
-            None => journal.write(&(header, made_by))?,
-            Some(line) => match serde_json::from_slice::<(Vec<String>, String)>(line) {
-                Ok((names, by)) if names == header && by == made_by => {}
-                Ok((names, _)) if names == header => return Err(of("another model, or other options").into()),
-                _ => return Err(other().into()),
-            },
-        }
-        let row = |line| {
-            let (record, group, verdict, numbers, remarks) = serde_json::from_slice::<Line>(line).ok()?;
-            let number = |text: Option<String>| text.map(|text| text.parse()).transpose().ok();
-            let numbers = numbers.into_iter().map(number).collect::<Option<_>>()?;
-            Some(Row { name: Name { record, group }, verdict, numbers, remarks })
+        let Some(first) = lines.next() else {
+            journal.write(&(header, made_by))?;
+            return Ok((journal, vec![]));
         };
-        let rows: Option<Vec<Row>> = lines.map(row).collect();
-        Ok((journal, rows.ok_or_else(other)?))
+        let (names, by) = serde_json::from_slice::<(Vec<String>, String)>(first).map_err(|_| other())?;
+        let rows = lines.map(row).collect::<Option<Vec<Row>>>().ok_or_else(other)?;
+        if names == header && by == made_by {
+            return Ok((journal, rows));
+        }
+        if rows.iter().any(|row| !row.is_error()) {
+            return Err(if names == header { of("another model, or other options") } else { other() }.into());
+        }
+        journal.file.set_len(0).and_then(|()| journal.file.rewind()).map_err(failed)?;
+        journal.write(&(header, made_by))?;
+        Ok((journal, vec![]))
     }
 
     /// Adds a row.
@@ -92,6 +100,19 @@ mod tests {
         assert!(error.contains("another model, or other options"), "{error}");
         let (journal, rows) = Journal::open(&path, &header, "a").unwrap();
         assert_eq!(rows, [row]);
+        journal.remove().unwrap();
+    }
+
+    #[test]
+    fn errors_of_other_options_are_begun_anew() {
+        let path = std::env::temp_dir().join(format!("greybox_journal_errors_{}", std::process::id()));
+        let header = ["record".to_owned()];
+        let failed = Row::failed(Name { record: "a.csv".to_owned(), group: None }, "no column `w`".to_owned());
+        Journal::open(&path, &header, "a").unwrap().0.add(&failed).unwrap();
+        assert_eq!(Journal::open(&path, &header, "a").unwrap().1, [failed]);
+        assert_eq!(Journal::open(&path, &header, "b").unwrap().1, []);
+        let (journal, rows) = Journal::open(&path, &header, "b").unwrap();
+        assert_eq!(rows, []);
         journal.remove().unwrap();
     }
 }

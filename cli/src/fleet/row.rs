@@ -1,5 +1,6 @@
 //! The row of one record.
 
+use crate::remedies::in_shell;
 use crate::{Failure, Verdict};
 use greybox::Severity;
 use greybox::layout::Layout;
@@ -45,7 +46,12 @@ impl Row {
 
     /// The row of a record that cannot be fitted.
     pub fn failed(name: Name, error: String) -> Self {
-        Row { name, verdict: "error".to_owned(), numbers: vec![], remarks: error }
+        Row { name, verdict: "error".to_owned(), numbers: vec![], remarks: in_shell(&error) }
+    }
+
+    /// Whether the record could not be read or fitted.
+    pub fn is_error(&self) -> bool {
+        self.verdict == "error"
     }
 
     pub fn verdict(&self) -> Verdict {

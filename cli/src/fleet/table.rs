@@ -8,22 +8,39 @@ use crate::{Failure, Verdict, output};
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
+/// The end of the name of the file beside a table that says by which model and options it was made.
+const RUN: &str = ".run";
+
 /// All rows that are known, and where they go.
 pub struct Table {
     header: Header,
     rows: Vec<Row>,
+    /// Rows of earlier runs that are errors: their records are tried again.
+    failed: Vec<Row>,
     path: Option<PathBuf>,
     journal: Option<Journal>,
+    /// By which model and options the rows are made.
+    made_by: String,
 }
 
 impl Table {
-    /// An empty table, or that of earlier runs: what a finished one has written, then what an unfinished one has done by the same model and options.
+    /// An empty table, or that of earlier runs by the same model and options: what a finished one has written, then what an unfinished one has
+    /// done.
     ///
     /// # Errors
-    /// A file that is something else, or cannot be written.
-    pub fn open(path: Option<&Path>, header: Header, made_by: &str) -> Result<Self, Failure> {
-        let mut table = Table { header, rows: vec![], path: path.map(Path::to_owned), journal: None };
+    /// A file that is something else, is of another model or other options, or cannot be written.
+    pub fn open(path: Option<&Path>, header: Header, made_by: String) -> Result<Self, Failure> {
+        let (path_of, rows, failed) = (path.map(Path::to_owned), vec![], vec![]);
+        let mut table = Table { header, rows, failed, path: path_of, journal: None, made_by };
         let Some(path) = path else { return Ok(table) };
+        output::check(Some(path), &[])?;
+        if path.exists() && !path.is_file() {
+            return Err(format!(
+                "{}: a table is a file, which this is not; name a .csv or a .parquet, or leave --out out to print it",
+                path.display()
+            )
+            .into());
+        }
         if output::ending(path) == "parquet" && cfg!(not(feature = "arrow")) {
             return Err(format!(
                 "{}: this build writes no Parquet; name a .csv, or build with the feature `arrow` \
@@ -32,15 +49,38 @@ impl Table {
             )
             .into());
         }
-        if path.is_file() {
-            table.rows = table.read(path).map_err(|error| format!("{}: {error}", path.display()))?;
-        }
-        let (journal, rows) = Journal::open(&beside(path, ".journal"), &table.header.names, made_by)?;
-        // A run that was killed between writing the table and removing its journal has the rows twice.
-        let there: HashSet<_> = table.rows.iter().map(|row| row.name.clone()).collect();
-        table.rows.extend(rows.into_iter().filter(|row| !there.contains(&row.name)));
+        let written = match path.is_file() {
+            true => table.read(path).map_err(|error| format!("{}: {error}", path.display()))?,
+            false => vec![],
+        };
+        let written = table.own(path, written)?;
+        let (journal, unfinished) = Journal::open(&beside(path, ".journal"), &table.header.names, &table.made_by)?;
         table.journal = Some(journal);
+        // A run that was killed between writing the table and removing its journal has the rows twice; an error may have become an answer.
+        let (failed, rows): (Vec<Row>, Vec<Row>) = written.into_iter().chain(unfinished).partition(Row::is_error);
+        let mut there = HashSet::new();
+        table.rows = rows.into_iter().filter(|row| there.insert(row.name.clone())).collect();
+        table.failed = failed.into_iter().filter(|row| there.insert(row.name.clone())).collect();
         Ok(table)
+    }
+
+    /// The rows of a table if this model and these options have made them, none if nothing but errors would be lost.
+    fn own(&self, path: &Path, written: Vec<Row>) -> Result<Vec<Row>, Failure> {
+        let run = beside(path, RUN);
+        let made_by = std::fs::read_to_string(&run);
+        if made_by.as_ref().is_ok_and(|made_by| *made_by == self.made_by) {
+            return Ok(written);
+        }
+        if written.iter().all(Row::is_error) {
+            return Ok(vec![]);
+        }
+        let why = match made_by {
+            Ok(_) => format!("its rows are of another model, or other options, which are in {}", run.display()),
+            Err(error) => {
+                format!("by which model and options its rows were made is not known ({}: {error})", run.display())
+            }
+        };
+        Err(format!("{}: {why}; name another table, or remove this one", path.display()).into())
     }
 
     pub fn rows(&self) -> &[Row] {
@@ -49,7 +89,7 @@ impl Table {
 
     /// Adds a row, and says why a record has no estimate.
     pub fn add(&mut self, row: Row, terminal: &Terminal) -> Result<(), Failure> {
-        if row.verdict == "error" {
+        if row.is_error() {
             let group = row.name.group.as_ref().map_or(String::new(), |group| format!(", {group}"));
             terminal.remark(format_args!("{}{group}: {}", row.name.record, row.remarks));
         }
@@ -60,9 +100,13 @@ impl Table {
         Ok(())
     }
 
-    /// Writes the table to its file, which is whole at any time.
-    pub fn finish(&mut self) -> Result<(), Failure> {
+    /// Writes the table to its file, which is whole at any time, with the errors of earlier runs but for those of files that were tried
+    /// again.
+    pub fn finish(&mut self, tried: &HashSet<String>) -> Result<(), Failure> {
+        let failed = std::mem::take(&mut self.failed);
+        self.rows.extend(failed.into_iter().filter(|row| !tried.contains(&row.name.record)));
         let Some(path) = &self.path else { return Ok(()) };
+        output::write(Some(&beside(path, RUN)), self.made_by.as_bytes())?;
         output::write(Some(path), &self.content(path)?)?;
         self.journal.take().map_or(Ok(()), Journal::remove)
     }

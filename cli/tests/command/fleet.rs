@@ -1,6 +1,6 @@
 //! `fleet`: tables of many records, which go on where they were.
 
-use crate::bench::{Bench, record};
+use crate::bench::{Bench, MODEL, record};
 use std::fmt::Write;
 use std::process::Stdio;
 use std::time::{Duration, Instant};
@@ -54,7 +54,7 @@ fn a_column_tells_the_records_of_a_file_apart() {
     let rows: Vec<&str> = table.lines().collect();
     assert!(rows.len() == 4 && rows[0].starts_with("record,motor,verdict,rs,rs_std"), "{table}");
     assert!(rows[1].starts_with("motors.csv,m0,") && rows[2].starts_with("motors.csv,m1,error,,"), "{table}");
-    assert_eq!(bench.names(), ["motors.csv", "pmsm.toml", "record.csv", "t.csv"], "no journal is left");
+    assert_eq!(bench.names(), ["motors.csv", "pmsm.toml", "record.csv", "t.csv", "t.csv.run"], "no journal is left");
     // Each by itself is the same as in a file of its own, to the bit.
     let alone: Vec<&str> = text.lines().filter(|line| line.starts_with("m2,") || line.starts_with("motor,")).collect();
     std::fs::write(bench.path("m2.csv"), alone.join("\n")).unwrap();
@@ -123,9 +123,82 @@ fn rows_without_a_name_are_in_the_table_once() {
         let words = ["fleet", "pmsm.toml", "motors.csv", "--by", "motor", "--out", out];
         let (_, error) = bench.ends(3, &words);
         assert!(error.contains("1 records: ") && error.contains("1 error"), "{error}");
+        // As of any error, it is tried again.
         let (_, error) = bench.ends(3, &words);
-        assert!(error.contains("1 records are in the table already") && error.contains("0 records: "), "{error}");
+        assert!(error.contains("1 records: ") && !error.contains("in the table already"), "{error}");
     }
+    assert_eq!(std::fs::read_to_string(bench.path("t.csv")).unwrap().lines().count(), 2);
+}
+
+/// By whatever the command differs, and where it is not known by what the rows were made.
+#[test]
+fn a_table_is_of_one_model_and_its_options() {
+    let bench = Bench::new();
+    std::fs::copy(record(), bench.path("more.csv")).unwrap();
+    std::fs::write(bench.path("other.toml"), MODEL.replace("start = 0.7", "start = 0.8")).unwrap();
+    let outs: &[&str] = if cfg!(feature = "arrow") { &["t.csv", "t.parquet"] } else { &["t.csv"] };
+    for out in outs {
+        bench.ends(0, &["fleet", "pmsm.toml", "record.csv", "--out", out]);
+        let table = std::fs::read(bench.path(out)).unwrap();
+        let refused = |words: &[&str], why: &str| {
+            let words = [&["fleet"], words, &["*.csv", "--out", out]].concat();
+            let (_, error) = bench.ends(1, &words);
+            assert!(error.contains(why) && error.contains("name another table, or remove this one"), "{error}");
+            assert_eq!(std::fs::read(bench.path(out)).unwrap(), table);
+            assert!(!bench.path(&format!("{out}.journal")).exists());
+        };
+        refused(&["pmsm.toml", "--loss", "huber"], "another model, or other options");
+        refused(&["pmsm.toml", "--constant", "np=4", "--fix", "ls=4e-3"], "another model, or other options");
+        refused(&["other.toml"], "another model, or other options");
+        let run = bench.path(&format!("{out}.run"));
+        let made_by = std::fs::read_to_string(&run).unwrap();
+        assert!(made_by.contains(MODEL) && !made_by.contains("None"), "{made_by}");
+        std::fs::remove_file(&run).unwrap();
+        refused(&["pmsm.toml"], ".run: ");
+        std::fs::write(&run, made_by).unwrap();
+        let (_, error) = bench.ends(0, &["fleet", "pmsm.toml", "record.csv", "more.csv", "--out", out]);
+        assert!(error.contains("1 records are in the table already") && error.contains("1 records: "), "{error}");
+    }
+}
+
+#[test]
+fn records_that_failed_are_tried_again() {
+    let bench = Bench::new();
+    std::fs::copy(record(), bench.path("b.csv")).unwrap();
+    let table = || std::fs::read_to_string(bench.path("t.csv")).unwrap();
+    // A mistake that no record survives is no run that holds on to its options.
+    let (_, error) =
+        bench.ends(3, &["fleet", "pmsm.toml", "record.csv", "b.csv", "--column", "w=speed", "--out", "t.csv"]);
+    assert!(error.contains("2 error"), "{error}");
+    std::fs::write(bench.path("b.csv"), "t,ud,uq,w,id,iq\n0,1,2\n").unwrap();
+    let (_, error) = bench.ends(3, &["fleet", "pmsm.toml", "record.csv", "b.csv", "--out", "t.csv"]);
+    assert!(error.contains("1 usable") && error.contains("1 error"), "{error}");
+    assert_eq!(table().lines().count(), 3, "{}", table());
+    // A file that is not named keeps its row.
+    bench.ends(3, &["fleet", "pmsm.toml", "record.csv", "--out", "t.csv"]);
+    assert!(table().contains("\nb.csv,error,"), "{}", table());
+    std::fs::copy(record(), bench.path("b.csv")).unwrap();
+    let (_, error) = bench.ends(0, &["fleet", "pmsm.toml", "record.csv", "b.csv", "--out", "t.csv"]);
+    assert!(error.contains("1 records are in the table already") && error.contains("1 records: 1 usable"), "{error}");
+    assert!(table().lines().count() == 3 && table().contains("\nb.csv,usable,"), "{}", table());
+}
+
+#[test]
+fn a_file_that_is_named_twice_is_read_once() {
+    let bench = Bench::new();
+    motors(&bench, "motors.csv", 2);
+    let (out, error) = bench.ends(0, &["fleet", "pmsm.toml", "motors.csv", "./motors.csv", "--by", "motor"]);
+    assert!(error.contains("1 files are named again; each is read once"), "{error}");
+    assert!(!error.contains("more than one file") && out.lines().count() == 3, "{error}\n{out}");
+}
+
+#[cfg(unix)]
+#[test]
+fn a_table_is_a_file() {
+    let bench = Bench::new();
+    let (_, error) = bench.ends(1, &["fleet", "pmsm.toml", "record.csv", "--out", "/dev/null"]);
+    assert!(error.contains("/dev/null: a table is a file") && error.contains("leave --out out"), "{error}");
+    assert!(!std::path::Path::new("/dev/null.journal").exists());
 }
 
 /// A pipe that nobody writes to holds up whoever opens it.

@@ -2,8 +2,9 @@
 
 mod bench;
 mod fleet;
+mod project;
 
-use bench::{Bench, MODEL, value};
+use bench::{Bench, MODEL, record, value};
 use std::path::Path;
 use std::process::Output;
 
@@ -169,6 +170,39 @@ fn files_that_cannot_be_written_are_named_at_once() {
         let (out, error) = bench.ends(1, &["fit", "pmsm.toml", "record.csv", option, path]);
         assert!(out.is_empty() && error.contains(path) && error.contains(says), "{out} {error}");
     }
+    for command in ["residuals", "profile", "bootstrap", "compare"] {
+        let model: &[&str] = if command == "compare" { &["--model", "pmsm.toml"] } else { &["pmsm.toml"] };
+        let words = [&[command], model, &["record.csv", "--report", "nowhere/r.html"]].concat();
+        let (out, error) = bench.ends(1, &words);
+        // A record that is read says what was guessed of it.
+        assert!(out.is_empty() && error.starts_with("error: nowhere/r.html: there is no such folder"), "{error}");
+    }
+    for command in ["simulate", "convert"] {
+        let (_, error) = bench.ends(1, &[command, "pmsm.toml", "record.csv", "--out", "made.txt"]);
+        assert!(error.starts_with("error: made.txt: ") && error.contains("take .csv or .json"), "{error}");
+    }
+}
+
+/// A link stays one.
+#[cfg(unix)]
+#[test]
+fn what_a_link_leads_to_is_written() {
+    let bench = Bench::new();
+    for (link, file) in [("e.json", "estimate"), ("r.html", "report"), ("p.svg", "plot"), ("t.csv", "table")] {
+        std::fs::write(bench.path(file), "").unwrap();
+        std::os::unix::fs::symlink(bench.path(file), bench.path(link)).unwrap();
+    }
+    let words = ["fit", "pmsm.toml", "record.csv", "--json", "e.json", "--report", "r.html", "--plot", "p.svg"];
+    bench.ends(0, &words);
+    bench.ends(0, &["convert", "pmsm.toml", "record.csv", "--out", "t.csv"]);
+    for (link, file, begin) in
+        [("e.json", "estimate", "{"), ("r.html", "report", "<!"), ("p.svg", "plot", "<svg"), ("t.csv", "table", "t,")]
+    {
+        assert!(bench.path(link).is_symlink(), "{link}");
+        let text = std::fs::read_to_string(bench.path(file)).unwrap();
+        assert!(text.starts_with(begin), "{file}: {}", text.lines().next().unwrap_or_default());
+    }
+    assert!(!bench.names().iter().any(|name| name.ends_with(".part")), "{:?}", bench.names());
 }
 
 #[test]
@@ -266,4 +300,172 @@ fn dates_are_read_with_an_order_and_a_zone() {
     assert!(error.contains("Europe/Berlim"), "{error}");
     let error = check(&["--date-order", "year"]);
     assert!(error.contains("day, month"), "{error}");
+}
+
+/// The speed is sampled at every tenth row only; it changes by 90 rad/s each second, 0.2 rad/s between its samples.
+#[test]
+fn an_input_with_a_rate_of_its_own_is_filled_in() {
+    let bench = Bench::new();
+    let text = std::fs::read_to_string(bench.path("record.csv")).unwrap();
+    let sparse = |(k, line): (usize, &str)| {
+        let mut cells: Vec<&str> = line.split(',').collect();
+        if k % 10 != 1 && k > 0 {
+            cells[3] = "";
+        }
+        cells.join(",") + "\n"
+    };
+    std::fs::write(bench.path("sparse.csv"), text.lines().enumerate().map(sparse).collect::<String>()).unwrap();
+    let (_, error) = bench.ends(1, &["fit", "pmsm.toml", "sparse.csv"]);
+    assert!(error.contains("`w` is NaN") && error.contains("a rate of its own (--fill)"), "{error}");
+    let words = ["fit", "pmsm.toml", "sparse.csv", "--fill", "w", "--hold", "w=first"];
+    let output = bench.run(&words);
+    let [out, error] = [&output.stdout, &output.stderr].map(|text| String::from_utf8_lossy(text).into_owned());
+    assert!(error.contains("`w` filled in between 200 samples; 9 rows left out"), "{error}");
+    // Where the speed bends between its samples it is not quite right: the standard error of the resistance is 4e-3.
+    assert!((value(&out, "rs") - 0.63).abs() < 0.012 && (value(&out, "ke") - 0.95).abs() < 2e-3, "{out}");
+    let (_, error) = bench.ends(1, &["fit", "pmsm.toml", "sparse.csv", "--fill", "v"]);
+    assert!(error.contains("`v`") && error.contains("ud, uq, w"), "{error}");
+}
+
+#[test]
+fn remedies_are_options() {
+    let bench = Bench::new();
+    let text = std::fs::read_to_string(bench.path("record.csv")).unwrap();
+    std::fs::write(bench.path("rpm.csv"), text.replacen(",w,", ",w [rpm],", 1)).unwrap();
+    let (_, error) = bench.ends(1, &["fit", "pmsm.toml", "rpm.csv"]);
+    assert!(error.contains("give --unit w=0.10471975511965977, or 1") && !error.contains("DataFile"), "{error}");
+}
+
+/// With the digits that the standard error leaves, however small or large.
+#[test]
+fn derived_quantities_have_significant_digits() {
+    let bench = Bench::new();
+    let words = ["fit", "pmsm.toml", "record.csv", "--derived", "small=ls*1e-6", "--derived", "large=rs*1e9"];
+    let (out, _) = bench.ends(0, &words);
+    let line = |name: &str| out.lines().find(|line| line.starts_with(&format!("{name} = "))).unwrap();
+    for (name, truth, expected) in [("small", 4e-9, 1e-11), ("large", 0.63e9, 1e6)] {
+        let numbers =
+            line(name).split(['=', ',', '…']).flat_map(|part| part.split(' ')).filter_map(|word| word.parse().ok());
+        let numbers: Vec<f64> = numbers.filter(|number| *number != 95.0).collect();
+        let [value, error, lower, upper] = numbers[..] else { panic!("{}", line(name)) };
+        assert!((value - truth).abs() < expected && error > 0.0 && lower < value && value < upper, "{}", line(name));
+        assert!(line(name).chars().count() < 80, "{}", line(name));
+    }
+}
+
+#[test]
+fn patterns_are_expanded_wherever_records_are_named() {
+    let bench = Bench::new();
+    std::fs::copy(record(), bench.path("other.csv")).unwrap();
+    let (out, _) = bench.ends(0, &["compare", "--model", "pmsm.toml", "rec*.csv", "--validation", "oth*.csv"]);
+    assert!(out.contains("other"), "{out}");
+    bench.ends(0, &["convert", "pmsm.toml", "rec*.csv", "--out", "made.csv"]);
+    let (_, error) = bench.ends(1, &["convert", "pmsm.toml", "*.csv"]);
+    assert!(error.contains("name one record, after the model; 3 are named"), "{error}");
+}
+
+/// What would have no effect, or contradicts another option.
+#[test]
+fn options_without_a_meaning_are_refused() {
+    let bench = Bench::new();
+    let simulate = |option: &str, value: &str| {
+        let fixed = ["--fix", "rs=0.63", "--fix", "ls=4e-3", "--fix", "ke=0.95"];
+        let (out, error) =
+            bench.ends(1, &[&["simulate", "pmsm.toml", "record.csv", option, value], &fixed[..]].concat());
+        assert!(out.is_empty() && error.contains(option), "{error}");
+        error
+    };
+    for (option, value) in [
+        ("--bounds", "rs=0..1"),
+        ("--prior", "rs=1,1"),
+        ("--log", "rs"),
+        ("--positive", "rs"),
+        ("--free", "rs"),
+        ("--per-record", "rs"),
+    ] {
+        let error = simulate(option, value);
+        assert!(error.contains("it has no meaning here; it is an option of fit, compare, "), "{error}");
+    }
+    assert!(simulate("--noise", "id=-1").contains("-1 is no standard deviation; give a positive number, or 0"));
+    let (_, error) = bench.ends(1, &["check", "pmsm.toml", "record.csv", "--sample-time", "5e-4", "--time", "t"]);
+    assert!(error.contains("--sample-time <SECONDS>") && error.contains("--time <COLUMN>"), "{error}");
+    let (_, error) = bench.ends(1, &["check", "pmsm.toml", "record.csv", "--sample-time", "5e-4", "--column", "t=t"]);
+    assert!(error.contains("--sample-time 0.0005: --column t=t gives the time, too"), "{error}");
+}
+
+/// A bootstrap has intervals only when all refits are done.
+#[cfg(unix)]
+#[test]
+fn an_ended_bootstrap_says_what_is_lost() {
+    use std::process::{Command, Stdio};
+    let bench = Bench::new();
+    bench.ends(0, &["fit", "pmsm.toml", "record.csv", "--json", "e.json"]);
+    let words = ["bootstrap", "pmsm.toml", "record.csv", "--estimate", "e.json", "--refits", "1000000"];
+    let run = bench.command(&words).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
+    std::thread::sleep(std::time::Duration::from_secs(3));
+    assert!(Command::new("kill").args(["-INT", &run.id().to_string()]).status().unwrap().success());
+    let Output { status, stdout, stderr } = run.wait_with_output().unwrap();
+    let error = String::from_utf8(stderr).unwrap();
+    assert!(status.code() == Some(1) && stdout.is_empty(), "{error}");
+    assert!(error.contains("ending without a result") && error.contains("the refits so far are lost"), "{error}");
+    assert!(!error.contains("the best so far"), "{error}");
+}
+
+/// Two lags under one input, one twice as fast: each record has the parameter of its own, wherever it is asked for.
+#[test]
+fn each_record_has_its_own_parameter() {
+    let bench = Bench::new();
+    let model = "greybox = 1\n[inputs]\nu = \"1\"\n[parameters]\np = { unit = \"1/s\", start = 1.0 }\n[states]\n\
+                 x = { unit = \"1\", derivative = \"p*(u - x)\", initial = 0 }\n[outputs]\nx = \"x\"\n";
+    std::fs::write(bench.path("lag.toml"), model).unwrap();
+    for (name, p) in [("slow", 2.0f64), ("fast", 4.0)] {
+        let (mut x, mut text) = (0.0f64, "t,u,x\n".to_owned());
+        for k in 0..200 {
+            let u = f64::from(k / 20 % 2);
+            text += &format!("{},{u},{}\n", 0.1 * f64::from(k), x + 0.01 * f64::from(k * 37 % 21 - 10) / 10.0);
+            x = u + (x - u) * (-0.1 * p).exp();
+        }
+        std::fs::write(bench.path(&format!("{name}.csv")), text).unwrap();
+    }
+    let records = ["slow.csv", "fast.csv", "--per-record", "p"];
+    let fit = [&["fit", "lag.toml"], &records[..], &["--derived", "tau=1/p", "--json", "e.json"]].concat();
+    let out = String::from_utf8_lossy(&bench.run(&fit).stdout).into_owned();
+    let tau = |name: &str| {
+        let found = out.lines().find_map(|line| line.strip_prefix(&format!("tau [{name}] = ")));
+        found.and_then(|rest| rest.split(',').next()?.parse::<f64>().ok()).unwrap_or(f64::NAN)
+    };
+    assert!((tau("slow") - 0.5).abs() < 2e-3 && (tau("fast") - 0.25).abs() < 2e-3, "{out}");
+    let compare = [&["compare", "--model", "lag.toml:e.json"], &records[..]].concat();
+    let out = String::from_utf8_lossy(&bench.run(&compare).stdout).into_owned();
+    let fits: Vec<f64> = out
+        .lines()
+        .filter(|line| line.contains("estimation"))
+        .filter_map(|line| line.split_whitespace().find_map(|word| word.parse().ok().filter(|fit| *fit > 1.0)))
+        .collect();
+    assert!(fits.len() == 2 && fits.iter().all(|fit| *fit > 95.0), "{out}");
+    let last = |words: &[&str]| {
+        let (out, _) = bench.ends(0, words);
+        out.lines().nth(22).unwrap().rsplit(',').next().unwrap().parse::<f64>().unwrap()
+    };
+    // A tenth of a second after the first step.
+    let fast = last(&["simulate", "lag.toml", "fast.csv", "--estimate", "e.json"]);
+    assert!((fast - (1.0 - (-0.4f64).exp())).abs() < 5e-3, "{fast}");
+    std::fs::copy(bench.path("fast.csv"), bench.path("other.csv")).unwrap();
+    let (_, error) = bench.ends(1, &["simulate", "lag.toml", "other.csv", "--estimate", "e.json"]);
+    assert!(error.contains("`p` has a value for each record of the estimate (slow, fast)"), "{error}");
+}
+
+/// From the first sample, which the file has; without the outputs there it cannot be.
+#[test]
+fn a_simulation_begins_at_the_first_sample() {
+    let bench = Bench::new();
+    let (out, _) = bench.ends(0, &["simulate", "pmsm.toml", "record.csv", "--initial", "first"]);
+    let text = std::fs::read_to_string(bench.path("record.csv")).unwrap();
+    let currents = |line: &str| line.split(',').rev().take(2).map(|cell| cell.parse().unwrap()).collect::<Vec<f64>>();
+    assert_eq!(currents(out.lines().nth(1).unwrap()), currents(text.lines().nth(1).unwrap()));
+    let inputs: String =
+        text.lines().map(|line| line.split(',').take(4).collect::<Vec<_>>().join(",") + "\n").collect();
+    std::fs::write(bench.path("inputs.csv"), inputs).unwrap();
+    let (_, error) = bench.ends(1, &["simulate", "pmsm.toml", "inputs.csv", "--initial", "first"]);
+    assert!(error.contains("no column `id`"), "{error}");
 }
