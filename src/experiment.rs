@@ -125,7 +125,7 @@ impl<X: Signals, U: Signals, Y: Signals> Experiment<X, U, Y> {
     /// let record = Experiment::from_series(&model, vec![ud, uq, w], vec![id, iq])?;
     /// assert_eq!((record.len(), record.input(4).w), (11, 0.4));
     /// assert!(record.output(3).iq.is_nan() && record.output(4).iq == 4e-3);
-    /// # Ok::<(), greybox::Error>(())
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
     ///
     /// # Errors
