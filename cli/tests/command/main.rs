@@ -403,7 +403,9 @@ fn an_ended_bootstrap_says_what_is_lost() {
     let words = ["bootstrap", "pmsm.toml", "record.csv", "--estimate", "e.json", "--refits", "1000000"];
     let run = bench.command(&words).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
     std::thread::sleep(std::time::Duration::from_secs(3));
-    assert!(Command::new("kill").args(["-INT", &run.id().to_string()]).status().unwrap().success());
+    // The shell has it where there is no such program.
+    let kill = format!("kill -INT {}", run.id());
+    assert!(Command::new("sh").args(["-c", &kill]).status().unwrap().success());
     let Output { status, stdout, stderr } = run.wait_with_output().unwrap();
     let error = String::from_utf8(stderr).unwrap();
     assert!(status.code() == Some(1) && stdout.is_empty(), "{error}");
