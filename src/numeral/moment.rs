@@ -19,6 +19,7 @@ impl Default for TimeUnit {
     }
 }
 
+#[cfg_attr(not(feature = "csv"), allow(dead_code, reason = "files have units"))]
 impl TimeUnit {
     /// The unit of the model's time itself, where that is not the second: minutes of a model whose rates are per minute.
     pub fn of_model(name: impl Into<String>) -> Self {

@@ -132,6 +132,7 @@ pub(super) struct Filled {
     /// These samples.
     pub range: Range<usize>,
     /// How many numbers there were, of each input that is filled in.
+    #[cfg_attr(not(feature = "csv"), allow(dead_code, reason = "files say it"))]
     pub given: Vec<(String, usize)>,
 }
 
