@@ -25,10 +25,12 @@ pub use starts::{FailedStart, Minimum, Starts};
 pub use typed::{Estimate, Values};
 pub use warning::{About, Warning, WarningCode};
 
+use crate::error::Error;
 use crate::information::{Covariance, SquareMatrix};
 use crate::layout::Layout;
 use crate::optimize::Outcome;
 use crate::problem::Role;
+use crate::record::Record;
 use crate::severity::Severity;
 use serde::{Deserialize, Serialize};
 
@@ -121,6 +123,27 @@ impl Summary {
         found.parameters.iter_mut().zip(&own.parameters).for_each(|(parameter, value)| parameter.value = *value);
         found.experiments = vec![own];
         Some(found)
+    }
+
+    /// This estimate for a record. Of parameters that each experiment of the fit has for itself, those of the experiment of its name.
+    ///
+    /// # Errors
+    /// A record of another name, where experiments have parameters for themselves.
+    pub fn of_record(&self, record: &Record) -> Result<Summary, Error> {
+        let at = self.experiments.iter().position(|experiment| experiment.name == record.name());
+        if let Some(own) = at.and_then(|at| self.of_experiment(at)) {
+            return Ok(own);
+        }
+        match self.own_parameters().first().filter(|_| self.experiments.len() > 1) {
+            None => Ok(self.clone()),
+            Some(own) => Err(Error::Option(format!(
+                "experiment `{}`: parameter `{}` has a value for each record of the fit, and this is none of them ({}); give it the name of the one \
+                 whose values it has",
+                record.name(),
+                self.parameters[*own].name,
+                self.experiments.iter().map(|experiment| experiment.name.as_str()).collect::<Vec<_>>().join(", ")
+            ))),
+        }
     }
 
     /// The worst that is said of this estimate.

@@ -121,15 +121,8 @@ pub(crate) enum Relation {
 }
 
 /// How files write some units, in small letters.
-const WRITTEN: [(&str, &str); 7] = [
-    ("hz", "Hz"),
-    ("rpm", "rpm"),
-    ("u/min", "rpm"),
-    ("r/min", "rpm"),
-    ("rps", "rev/s"),
-    ("l/min", "l/min"),
-    ("pa", "Pa"),
-];
+const WRITTEN: [(&str, &str); 6] =
+    [("hz", "Hz"), ("rpm", "rpm"), ("u/min", "rpm"), ("r/min", "rpm"), ("rps", "rev/s"), ("pa", "Pa")];
 
 /// Scales of temperature, by where they begin.
 const ZEROS: [&[&str]; 3] = [&["K", "mK"], &["degC", "°C", "℃"], &["degF", "°F", "℉"]];
@@ -141,15 +134,15 @@ pub(crate) fn relation(from: &str, to: &str) -> Relation {
     if from.is_empty() {
         return Relation::Unknown;
     }
-    let written = |text: &str| WRITTEN.iter().find(|(file, _)| *file == text.to_lowercase()).map(|(_, unit)| *unit);
+    let written = WRITTEN.iter().find(|(file, _)| *file == from.to_lowercase());
     let zero = |text: &str| ZEROS.iter().position(|all| all.contains(&text));
-    let from = match (written(from), zero(to)) {
-        (Some(unit), _) => unit,
+    let from = match written {
+        Some((_, unit)) => unit,
         // A coulomb is no temperature.
-        (None, Some(_)) if from == "C" => "degC",
-        _ => from,
+        None if from == "C" && zero(to).is_some() => "degC",
+        None => from,
     };
-    if from == to || zero(from).is_some() && zero(from) == zero(to) && from != "mK" && to != "mK" {
+    if from == to {
         return Relation::Same;
     }
     if zero(from).zip(zero(to)).is_some_and(|(a, b)| a != b) {
@@ -157,19 +150,14 @@ pub(crate) fn relation(from: &str, to: &str) -> Relation {
     }
     let read = |text: &str| Unit::read(text, &BTreeMap::new()).ok();
     let Some((one, other)) = read(from).zip(read(to)) else { return Relation::Unknown };
-    match one.factor.zip(other.factor) {
-        Some(_) if one.same_dimension(&other) && is_frequency(from, &one) && to.contains("rad") => {
-            Relation::Factor(one.factor.unwrap_or(1.0) / other.factor.unwrap_or(1.0) * TAU)
-        }
-        Some((a, b)) if one.same_dimension(&other) => {
-            if one.same_size(&other) {
-                Relation::Same
-            } else {
-                Relation::Factor(a / b)
-            }
-        }
-        Some(_) if !other.is_dimensionless() && !from.eq_ignore_ascii_case(to) => Relation::Other,
-        _ => Relation::Unknown,
+    let Some((a, b)) = one.factor.zip(other.factor) else { return Relation::Unknown };
+    match one.same_dimension(&other) {
+        true if is_frequency(from, &one) && to.contains("rad") => Relation::Factor(a / b * TAU),
+        true if one.same_size(&other) => Relation::Same,
+        true => Relation::Factor(a / b),
+        // In letters of another size, such as `a` for amperes.
+        false if other.is_dimensionless() || from.eq_ignore_ascii_case(to) => Relation::Unknown,
+        false => Relation::Other,
     }
 }
 

@@ -170,14 +170,7 @@ fn factor(signal: &str, unit: &str, layout: &Layout) -> Result<f64, Failure> {
         return Err(greybox::Error::Unknown { what: "signal".into(), name: signal.into(), available }.into());
     };
     let factor = text::factor(unit, &quantity.unit)?;
-    // Scales of temperature that begin at different zeros.
-    let zero = |unit: &str| match unit.trim() {
-        "degC" | "°C" | "℃" => "Celsius",
-        "degF" | "°F" | "℉" => "Fahrenheit",
-        _ => "an absolute one",
-    };
-    let (from, to) = (zero(unit), zero(&quantity.unit));
-    if from == to {
+    if !text::begins_elsewhere(unit, &quantity.unit) {
         return Ok(factor);
     }
     let of_signal = &quantity.unit;

@@ -6,7 +6,7 @@ use crate::terminal::Terminal;
 use crate::{Failure, Verdict, convert, output, records};
 use greybox::layout::Layout;
 use greybox::record::Record;
-use greybox::{Fleet, Summary, fixed};
+use greybox::{Fleet, fixed};
 
 pub fn run(one: &Simulate, terminal: &Terminal) -> Result<Verdict, Failure> {
     output::check(one.out.as_deref(), &output::RECORDS)?;
@@ -23,7 +23,7 @@ pub fn run(one: &Simulate, terminal: &Terminal) -> Result<Verdict, Failure> {
         if found.layout.parameters != layout.parameters {
             return Err(format!("{}: the estimate is of a model with other parameters", path.display()).into());
         }
-        let found = of_record(found, &inputs)?;
+        let found = found.of_record(&inputs)?;
         // What the command line sets is kept.
         let said = |name: &str| one.of_model.set.iter().chain(&one.of_model.fix).any(|(known, _)| known == name);
         for (parameter, found) in parameters.iter_mut().zip(&found.parameters) {
@@ -49,27 +49,6 @@ pub fn run(one: &Simulate, terminal: &Terminal) -> Result<Verdict, Failure> {
     let simulated = if noise.is_empty() { simulated } else { noisy(&simulated, layout, &noise, one.seed)? };
     convert::write(&simulated, one.out.as_deref())?;
     Ok(Verdict::Usable)
-}
-
-/// The estimate for a record: of several of the fit, for that of its name.
-fn of_record(estimate: Summary, record: &Record) -> Result<Summary, Failure> {
-    let at = estimate.experiments.iter().position(|experiment| experiment.name == record.name());
-    if let Some(own) = at.and_then(|at| estimate.of_experiment(at)) {
-        return Ok(own);
-    }
-    match estimate.own_parameters().first() {
-        Some(parameter) if estimate.experiments.len() > 1 => {
-            let names: Vec<&str> = estimate.experiments.iter().map(|experiment| experiment.name.as_str()).collect();
-            Err(format!(
-                "`{}` has a value for each record of the estimate ({}), and {} is none of them: say it by --set",
-                estimate.parameters[*parameter].name,
-                names.join(", "),
-                record.name()
-            )
-            .into())
-        }
-        _ => Ok(estimate),
-    }
 }
 
 fn noisy(record: &Record, layout: &Layout, noise: &[(String, f64)], seed: u64) -> Result<Record, Failure> {

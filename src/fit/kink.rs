@@ -1,18 +1,19 @@
-//! Minima at a kink of the cost: where a held input acts late by a whole number of samples, slopes with respect to the dead time differ from one side
-//! to the other, and may lead back from both.
+//! Minima at a kink of the cost: where a held input acts late by a whole number of samples, the slope with respect to the dead time jumps, and the cost may
+//! rise on both sides.
 
 use crate::optimize::{Domain, LeastSquares, LevenbergMarquardt, Linearization, Machine, Request};
 use crate::problem::{Objective, Round};
 
-/// How far beside a kink slopes are asked for, as a part of the unknown. A search ends within 1e-9 of it.
+/// How far beside a kink slopes are taken, as a part of the unknown: searches were seen to end within 1e-9 of the kink, and over this distance the
+/// slope of a smooth cost changes little.
 const BESIDE: f64 = 1e-5;
-/// Slopes that differ by so many times as much as those of a smooth cost do jump.
+/// Slopes before and behind a point jump if they differ by more than so many times what the curvature of a smooth cost makes of the distance.
 const JUMP: f64 = 10.0;
-/// Searches, each with the unknowns kept that are at a kink where it begins.
+/// Most searches with unknowns kept at kinks: in the first one others may run into kinks of their own.
 const SEARCHES: usize = 3;
 
-/// A round of a model with dead times that found no lower cost, as one that ended at a minimum: while unknowns are kept whose slopes jump there, the
-/// others have a minimum, from which slopes lead back on either side of these.
+/// The end of a round as a minimum, if the model has dead times and the cost a kink where no step lowers it: the unknowns whose slopes jump there are held, and
+/// the others searched. At the minimum that is found, the cost has to fall towards the kink from both sides. `None` where it is none.
 pub(super) fn at_kink(objective: &Objective<'_>, round: &Round) -> Option<Round> {
     let values = objective.values_of(0, &round.coordinates);
     if !objective.sweep.is_late(&values.p) {
@@ -32,6 +33,7 @@ pub(super) fn at_kink(objective: &Objective<'_>, round: &Round) -> Option<Round>
         kinks.iter().for_each(|i| domain.bounds[*i] = (round.coordinates[*i], round.coordinates[*i]));
         round = search(objective, round, domain);
         if round.outcome.converged() {
+            round.evaluations += 2 * kinks.len() as u64;
             let lead_back =
                 |i: &usize| Slopes::beside(objective, &round.coordinates, *i).is_some_and(Slopes::lead_back);
             return kinks.iter().all(lead_back).then_some(round);
@@ -45,7 +47,7 @@ pub(super) fn at_kink(objective: &Objective<'_>, round: &Round) -> Option<Round>
 struct Slopes {
     before: f64,
     behind: f64,
-    /// By how much they would differ without a kink, to first order.
+    /// By how much they would differ without a kink: the distance times the curvature `J'J`.
     smooth: f64,
 }
 
@@ -62,12 +64,12 @@ impl Slopes {
         Some(Slopes { before, behind, smooth: 2.0 * far * norm * norm })
     }
 
-    /// Whether the slope grows at once.
+    /// Whether the slope jumps upwards between the two.
     fn jump(self) -> bool {
         self.behind - self.before > JUMP * self.smooth
     }
 
-    /// Whether the cost falls before the point and rises behind it.
+    /// Whether the cost falls towards the point from both sides.
     fn lead_back(self) -> bool {
         self.before < 0.0 && self.behind > 0.0
     }
@@ -79,12 +81,12 @@ fn search(objective: &Objective<'_>, round: Round, domain: Domain) -> Round {
     machine.begin(round.coordinates.clone(), domain);
     let mut evaluations = round.evaluations;
     let outcome = loop {
-        evaluations += 1;
         match machine.request() {
             Request::Linearize(x) => machine.tell(objective.linearize(x)),
             Request::Curvature { x, along } => machine.tell_curvature(objective.curvature(x, along)),
             Request::Ended(outcome) => break outcome,
         }
+        evaluations += 1;
     };
     let linear: Option<Linearization> = machine.linearization().cloned();
     let outcome = objective.control.named(outcome);

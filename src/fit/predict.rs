@@ -23,7 +23,8 @@ pub(super) fn asked<'a, T>(
     estimate: &Summary,
     ask: impl FnOnce(&Objective<'_>, &[f64]) -> Result<T, Error>,
 ) -> Result<T, Error> {
-    let parameters = values(estimate, record)?.into_iter().map(fixed).collect::<Vec<_>>();
+    let own = estimate.of_record(record)?;
+    let parameters: Vec<_> = own.parameters.iter().map(|parameter| fixed(parameter.value)).collect();
     // An output without any error gives no noise level; it is then estimated from this record.
     let sigma = estimate.sigma();
     let noisy = sigma.iter().all(|sigma| *sigma > 0.0);
@@ -39,23 +40,6 @@ pub(super) fn asked<'a, T>(
         }
     };
     ask(&objective, &coordinates)
-}
-
-/// The parameters of an estimate for a record. Of parameters that each experiment of the fit has for itself, those of the experiment of its name.
-fn values(estimate: &Summary, record: &Record) -> Result<Vec<f64>, Error> {
-    let own = estimate.own_parameters();
-    let of_all = || estimate.parameters.iter().map(|parameter| parameter.value).collect();
-    let Some(first) = own.first().filter(|_| estimate.experiments.len() > 1) else { return Ok(of_all()) };
-    match estimate.experiments.iter().find(|experiment| experiment.name == record.name()) {
-        Some(experiment) => Ok(experiment.parameters.clone()),
-        None => Err(Error::Option(format!(
-            "experiment `{}`: parameter `{}` has a value for each record of the fit, and this is none of them ({}); give it the name of the one \
-             whose values it has",
-            record.name(),
-            estimate.parameters[*first].name,
-            estimate.experiments.iter().map(|experiment| experiment.name.as_str()).collect::<Vec<_>>().join(", ")
-        ))),
-    }
 }
 
 impl<M: Model> Fit<'_, M> {

@@ -263,7 +263,8 @@ pub(super) fn ended(objective: &Objective<'_>, mut round: Round) -> Round {
     if lost && noise::reproduces(objective, &round.coordinates) {
         round.outcome = Outcome::Exact;
     }
-    // A filter that takes a measurement for exact has errors below the rounding of its unknowns, in units of their deviations, whatever the others are.
+    // Where the noise level of a filter goes to zero, rounding of the unknowns changes standardized errors by as much as these are: the search ends as at an
+    // exact fit, though the errors of the outputs are not zero.
     if round.outcome == Outcome::Exact
         && objective.sweep.predicts_variance()
         && !noise::reproduces(objective, &round.coordinates)

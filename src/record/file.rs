@@ -200,8 +200,9 @@ impl DataFile {
         self.with(signal, |column| column.reversed = true)
     }
 
-    /// Fills in an input that has a rate of its own where its cells are empty: by the number before, or by straight lines, which its hold then is.
-    /// Rows at which it is not known yet are left out, and those after its last number where it is a straight line.
+    /// Fills in the empty cells of an input that is sampled less often than the rows: by the number before ([`Hold::Zero`], to the end of the file) or by
+    /// straight lines between numbers ([`Hold::First`]). This is then the hold of the input. Rows before its first number are left out, and of straight lines
+    /// those behind its last; [`Reading`] says how many.
     pub fn fill(self, input: &str, hold: Hold) -> Self {
         self.with(input, |column| column.fill = Some(hold))
     }

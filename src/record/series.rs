@@ -9,8 +9,8 @@ use std::ops::Range;
 /// Two instants closer than this part of the shortest usual step are one: `3 * 0.1` is not `0.3` in binary.
 const SAME: f64 = 1e-6;
 
-/// A signal with instants of its own, as loggers have them whose channels differ in rate: its times (s), which do not decrease, and the value
-/// at each. What it is between them matters for an input, which is held unless told otherwise.
+/// A signal with sample times of its own, such as a channel of a logger whose channels differ in rate: times (s) that do not decrease, and a value in the
+/// unit of the signal at each. Between its samples an input is held ([`Hold::Zero`]) unless [`hold`](Series::hold) says otherwise; an output is missing.
 #[derive(Clone, Debug)]
 pub struct Series {
     times: Vec<f64>,
@@ -24,7 +24,7 @@ impl Series {
         Series { times, values, hold: Hold::default() }
     }
 
-    /// Says what the signal is between its instants.
+    /// Says how an input behaves between its samples; of an output it has no effect.
     pub fn hold(self, hold: Hold) -> Self {
         Series { hold, ..self }
     }
@@ -65,9 +65,10 @@ impl Series {
 }
 
 impl Record {
-    /// A record of signals that have instants of their own, the inputs and outputs of a layout in its order. Its samples are the instants of all
-    /// of them, from the first at which every input is known, to the last at which those between straight lines are. Where only others were sampled,
-    /// an output is missing, and an input is filled in by its hold.
+    /// A record of signals with sample times of their own: the inputs and outputs of a layout, in its order. It has a sample at each time of any of
+    /// them, from the first at which every input has had one. Where a signal was not sampled, an output is missing (NaN), and an input is filled in by its
+    /// hold. A held input keeps its last value to the end of the record; with an input of straight lines ([`Hold::First`]) the record ends at that input's
+    /// last sample. Samples outside are left out.
     ///
     /// # Errors
     /// Another number of signals than the layout has; a signal without samples, with times that are not finite or decrease, or with an input that is
@@ -106,7 +107,7 @@ impl Record {
     }
 }
 
-/// The instants of all signals, each as often as the signal that has it most often.
+/// The times of all signals in order. One that a signal has several times (repeated measurements) stands as often.
 fn instants(all: &[&[f64]], same: f64) -> Vec<f64> {
     let mut places = vec![0; all.len()];
     let mut found = vec![];
@@ -154,7 +155,8 @@ impl Filled {
     }
 }
 
-/// Fills in a signal where it is NaN, and returns the samples at which it is known: from its first number on, of straight lines up to the last.
+/// Fills in a signal where it is NaN, and returns the range of samples in which it is known: from its first number on; up to its last one if it is a
+/// straight line between numbers, else to the end.
 fn fill(values: &mut [f64], hold: Hold, time: impl Fn(usize) -> f64) -> Range<usize> {
     // At one instant a signal has one value.
     let mut begin = 0;

@@ -454,7 +454,10 @@ fn each_record_has_its_own_parameter() {
     assert!((fast - (1.0 - (-0.4f64).exp())).abs() < 5e-3, "{fast}");
     std::fs::copy(bench.path("fast.csv"), bench.path("other.csv")).unwrap();
     let (_, error) = bench.ends(1, &["simulate", "lag.toml", "other.csv", "--estimate", "e.json"]);
-    assert!(error.contains("`p` has a value for each record of the estimate (slow, fast)"), "{error}");
+    assert!(
+        error.contains("`p` has a value for each record of the fit, and this is none of them (slow, fast)"),
+        "{error}"
+    );
 }
 
 /// From the first sample, which the file has; without the outputs there it cannot be.

@@ -185,7 +185,7 @@ pub(super) fn shift(evidence: &Evidence<'_>, objective: &Objective<'_>, unknowns
     found.into_iter().flatten().max_by(|a, b| a.errors.total_cmp(&b.errors))
 }
 
-/// The largest move of an unknown that is known by itself. The step that slopes ask for at the estimate, where it is at a kink of the cost, is none of it.
+/// The largest move of an unknown that is known by itself. The step that the estimate's own slopes ask for is subtracted: at a kink of the cost it is not zero.
 fn of_one(from: Option<&Linearization>, to: &Linearization, unknowns: &[Unknown]) -> Option<Shift> {
     let held: Vec<bool> = unknowns.iter().map(|row| row.knowledge.standard_error().is_none()).collect();
     let step = |linear: &Linearization| linear.step(&vec![0.0; unknowns.len()], &held);
