@@ -1,6 +1,7 @@
 //! [`Error`]: the cause where a call has no result. A fit that ends badly has a result: its [`Outcome`](crate::optimize::Outcome).
 
 use crate::numeral::Moment;
+use crate::unit::{Relation, relation};
 use std::path::PathBuf;
 
 /// A call that could not be served, with the thing, the number and the remedy.
@@ -206,7 +207,7 @@ pub enum Error {
     },
     /// A column in another unit than its signal.
     #[error(
-        "{}: column `{column}` is in \"{file}\" and signal `{signal}` in \"{model}\"; {}", path.display(), other_unit(signal, *factor)
+        "{}: column `{column}` is in \"{file}\" and signal `{signal}` in \"{model}\"; {}", path.display(), other_unit((file, model), signal, *factor)
     )]
     Unit {
         /// The file.
@@ -437,19 +438,28 @@ pub(crate) fn short(value: f64) -> String {
     if plain { value.to_string() } else { format!("{value:e}") }
 }
 
-/// What to do about a column in another unit.
-fn other_unit(signal: &str, factor: Option<f64>) -> String {
-    match factor {
-        Some(factor) => format!("give DataFile::factor(\"{signal}\", {factor}), or 1 if the file's unit is wrong"),
-        None => format!(
-            "neither is a multiple of the other: convert the column, or give DataFile::factor(\"{signal}\", 1) if the file's unit is wrong"
-        ),
+/// What to do about a column in another unit than its signal.
+fn other_unit((column, model): (&str, &str), signal: &str, factor: Option<f64>) -> String {
+    let taken = format!("DataFile::factor(\"{signal}\", 1) if the file's unit is wrong");
+    match (factor, relation(column, model)) {
+        (Some(factor), _) => {
+            format!("give DataFile::factor(\"{signal}\", {factor}), or 1 if the file's unit is wrong")
+        }
+        (None, Relation::OtherZero { .. }) => {
+            format!(
+                "their zeros differ: give DataFile::unit(\"{signal}\", \"{column}\"), which converts it, or {taken}"
+            )
+        }
+        (None, Relation::Unknown) => {
+            format!("how they are related is not known: give DataFile::factor(\"{signal}\", ..)")
+        }
+        (None, _) => format!("neither is a multiple of the other: convert the column, or give {taken}"),
     }
 }
 
 /// What to do about an input that is missing.
 fn own_rate(signal: &str, value: f64) -> &'static str {
-    match value.is_nan() && signal != "t" {
+    match value.is_nan() && signal != "t" && !signal.starts_with("time of") {
         true => "; fill in an input that has a rate of its own (DataFile::fill, Record::from_series)",
         false => "",
     }

@@ -103,24 +103,36 @@ impl Summary {
         self.unknowns.iter().map(|unknown| unknown.transform.to_coordinate(unknown.value)).collect()
     }
 
-    /// The parameters that each experiment has for itself, by their places in the layout.
+    /// The parameters that each experiment has for itself, estimated or fixed at values that differ, by their places in the layout.
     pub fn own_parameters(&self) -> Vec<usize> {
-        let own = |unknown: &Unknown| match (unknown.role, unknown.experiment) {
-            (Role::Parameter(j), Some(_)) => Some(j),
-            _ => None,
+        let is_estimated = |j: usize| {
+            self.unknowns.iter().any(|unknown| unknown.role == Role::Parameter(j) && unknown.experiment.is_some())
         };
-        let mut found: Vec<usize> = self.unknowns.iter().filter_map(own).collect();
-        found.sort_unstable();
-        found.dedup();
-        found
+        let differs =
+            |j: usize| self.experiments.windows(2).any(|pair| pair[0].parameters.get(j) != pair[1].parameters.get(j));
+        (0..self.parameters.len()).filter(|j| is_estimated(*j) || differs(*j)).collect()
     }
 
-    /// This estimate for one experiment of the fit, by its place: with the values that its parameters have there. `None` if the fit had no experiment of this
-    /// place.
+    /// This estimate for one experiment of the fit, by its place: where experiments have a parameter for themselves, with its value there and how well
+    /// that is known. It is the first experiment of what is returned. `None` if the fit had no experiment of this place.
     pub fn of_experiment(&self, experiment: usize) -> Option<Summary> {
         let own = self.experiments.get(experiment)?.clone();
         let mut found = self.clone();
-        found.parameters.iter_mut().zip(&own.parameters).for_each(|(parameter, value)| parameter.value = *value);
+        if self.experiments.len() > 1 {
+            for j in self.own_parameters() {
+                found.parameters[j].value = own.parameters.get(j).copied()?;
+            }
+            for unknown in &mut found.unknowns {
+                unknown.experiment = match unknown.experiment {
+                    Some(e) if e == experiment => Some(0),
+                    Some(0) => Some(experiment),
+                    other => other,
+                };
+                if let (Role::Parameter(j), Some(0)) = (unknown.role, unknown.experiment) {
+                    found.parameters[j].knowledge = unknown.knowledge;
+                }
+            }
+        }
         found.experiments = vec![own];
         Some(found)
     }
@@ -137,8 +149,8 @@ impl Summary {
         match self.own_parameters().first().filter(|_| self.experiments.len() > 1) {
             None => Ok(self.clone()),
             Some(own) => Err(Error::Option(format!(
-                "experiment `{}`: parameter `{}` has a value for each record of the fit, and this is none of them ({}); give it the name of the one \
-                 whose values it has",
+                "experiment `{}`: parameter `{}` has a value for each record of the fit, and this is none of them ({}; records of equal names are \
+                 numbered); give it the name of the one whose values it has",
                 record.name(),
                 self.parameters[*own].name,
                 self.experiments.iter().map(|experiment| experiment.name.as_str()).collect::<Vec<_>>().join(", ")

@@ -45,7 +45,7 @@ mod string;
 mod toml_value;
 mod write;
 
-pub use factor::{begins_elsewhere, factor};
+pub use factor::factor;
 pub use remark::{Error, Remark};
 pub use remedies::renamed;
 pub use shipped::{Shipped, shipped};

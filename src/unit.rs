@@ -112,59 +112,93 @@ pub(crate) enum Relation {
     Same,
     /// So many of the signal's is one of the column's.
     Factor(f64),
-    /// Scales of temperature that begin elsewhere.
-    OtherZero,
+    /// Scales of temperature that begin elsewhere: the signal's is so many times the column's, and then so much more.
+    OtherZero { factor: f64, shift: f64 },
     /// Both are known, and neither is a multiple of the other.
     Other,
-    /// One of them is not known, or the signal is a ratio, which may stand for anything.
+    /// One of them is not known, or says too little: no unit, a ratio, a number, a word such as `in`.
     Unknown,
 }
 
 /// How files write some units, in small letters.
-const WRITTEN: [(&str, &str); 6] =
-    [("hz", "Hz"), ("rpm", "rpm"), ("u/min", "rpm"), ("r/min", "rpm"), ("rps", "rev/s"), ("pa", "Pa")];
+const WRITTEN: [(&str, &str); 12] = [
+    ("hz", "Hz"),
+    ("rpm", "rpm"),
+    ("u/min", "rpm"),
+    ("r/min", "rpm"),
+    ("rev/min", "rpm"),
+    ("rps", "rev/s"),
+    ("pa", "Pa"),
+    ("bar", "bar"),
+    ("deg", "deg"),
+    ("deg/s", "deg/s"),
+    ("km/h", "km/h"),
+    ("l/min", "l/min"),
+];
 
-/// Scales of temperature, by where they begin.
-const ZEROS: [&[&str]; 3] = [&["K", "mK"], &["degC", "°C", "℃"], &["degF", "°F", "℉"]];
+/// Units that stand in brackets as words, too: `u(t)`, `p (in)`, `T (min)`. They count as units where the dimension is right.
+const WORDS: [&str; 6] = ["a", "d", "h", "in", "min", "t"];
+
+/// Scales of temperature: where they begin and the size of their degree, both in kelvins.
+const TEMPERATURES: [(&[&str], f64, f64); 4] = [
+    (&["K"], 0.0, 1.0),
+    (&["mK"], 0.0, 1e-3),
+    (&["degC", "°C", "℃"], 273.15, 1.0),
+    (&["degF", "°F", "℉"], 459.67 / 1.8, 1.0 / 1.8),
+];
 
 /// How the unit `from` of a column stands to the unit `to` of a signal. A frequency (Hz, 1/min) that stands for an angular velocity counts
-/// revolutions.
+/// revolutions, and so does one that an angular velocity stands for; but `1/s` for `rad/s` is one of radians.
 pub(crate) fn relation(from: &str, to: &str) -> Relation {
     let (from, to) = (from.trim(), to.trim());
-    if from.is_empty() {
+    // A number is an index: `AI[2]`.
+    if from.is_empty() || to.is_empty() || (from != to && from.parse::<f64>().is_ok()) {
         return Relation::Unknown;
     }
     let written = WRITTEN.iter().find(|(file, _)| *file == from.to_lowercase());
-    let zero = |text: &str| ZEROS.iter().position(|all| all.contains(&text));
+    let temperature = |text: &str| TEMPERATURES.iter().find(|(names, ..)| names.contains(&text));
     let from = match written {
         Some((_, unit)) => unit,
         // A coulomb is no temperature.
-        None if from == "C" && zero(to).is_some() => "degC",
+        None if from == "C" && temperature(to).is_some() => "degC",
         None => from,
     };
     if from == to {
         return Relation::Same;
     }
-    if zero(from).zip(zero(to)).is_some_and(|(a, b)| a != b) {
-        return Relation::OtherZero;
+    if let Some(((_, zero, degree), (_, zero_of_signal, of_signal))) = temperature(from).zip(temperature(to))
+        && zero != zero_of_signal
+    {
+        return Relation::OtherZero { factor: degree / of_signal, shift: (zero - zero_of_signal) / of_signal };
     }
     let read = |text: &str| Unit::read(text, &BTreeMap::new()).ok();
     let Some((one, other)) = read(from).zip(read(to)) else { return Relation::Unknown };
     let Some((a, b)) = one.factor.zip(other.factor) else { return Relation::Unknown };
-    match one.same_dimension(&other) {
-        true if is_frequency(from, &one) && to.contains("rad") => Relation::Factor(a / b * TAU),
-        true if one.same_size(&other) => Relation::Same,
-        true => Relation::Factor(a / b),
+    if !one.same_dimension(&other) {
         // In letters of another size, such as `a` for amperes.
-        false if other.is_dimensionless() || from.eq_ignore_ascii_case(to) => Relation::Unknown,
-        false => Relation::Other,
+        let says_little = other.is_dimensionless() || from.eq_ignore_ascii_case(to) || WORDS.contains(&from);
+        return if says_little { Relation::Unknown } else { Relation::Other };
     }
+    let radians = from.contains("rad") && !to.contains("Hz") && one.same_size(&other);
+    let turns = match (counts(from, &one), counts(to, &other)) {
+        (true, false) if names_angle(to) => TAU,
+        (false, true) if names_angle(from) && !radians => 1.0 / TAU,
+        _ => 1.0,
+    };
+    let factor = a / b * turns;
+    if (factor - 1.0).abs() < SAME_SIZE { Relation::Same } else { Relation::Factor(factor) }
 }
 
-/// Whether a unit is one over a time, and its text names no angle.
-fn is_frequency(text: &str, unit: &Unit) -> bool {
-    let angles = ["rad", "deg", "°", "rev", "turn", "rpm"];
-    unit.same_dimension(&Unit::one().over(&Unit::second())) && !angles.iter().any(|angle| text.contains(angle))
+/// Whether a text names the angle that its unit has.
+fn names_angle(text: &str) -> bool {
+    ["rad", "deg", "°", "rev", "turn", "rpm"].iter().any(|angle| text.contains(angle))
+}
+
+/// Whether a unit counts what comes in a second, or how that changes, and its text names no angle. `1/s^2` is an angular acceleration as well.
+fn counts(text: &str, unit: &Unit) -> bool {
+    let per_second = Unit::one().over(&Unit::second());
+    let rate = unit.same_dimension(&per_second) || text.contains("Hz") && unit.same_dimension(&per_second.power(2.0));
+    rate && !names_angle(text)
 }
 
 /// Why a text is no unit.
@@ -248,15 +282,28 @@ mod tests {
             ("min-1", "rad/s", Relation::Factor(TAU / 60.0)),
             ("s^-1", "rad/s", Relation::Factor(TAU)),
             ("rev/s", "rad/s", Relation::Factor(TAU)),
+            ("1/min", "rpm", Relation::Same),
+            ("rpm", "1/min", Relation::Same),
+            ("Hz", "rev/s", Relation::Same),
+            ("rpm", "Hz", Relation::Factor(1.0 / 60.0)),
+            ("Hz", "rpm", Relation::Factor(60.0)),
+            ("Hz", "deg/s", Relation::Factor(360.0)),
+            ("rad/s", "Hz", Relation::Factor(1.0 / TAU)),
+            ("Hz/s", "rad/s^2", Relation::Factor(TAU)),
+            ("rpm/s", "rad/s^2", Relation::Factor(TAU / 60.0)),
+            ("1/s^2", "rad/s^2", Relation::Same),
+            ("Deg/s", "rad/s", Relation::Factor(TAU / 360.0)),
+            ("Bar", "Pa", Relation::Factor(1e5)),
+            ("KM/H", "m/s", Relation::Factor(1.0 / 3.6)),
             ("deg/s", "rad/s", Relation::Factor(TAU / 360.0)),
             ("rad/min", "rad/s", Relation::Factor(1.0 / 60.0)),
             ("1/min", "Hz", Relation::Factor(1.0 / 60.0)),
             ("%", "1", Relation::Factor(1e-2)),
             ("m3/h", "m^3/s", Relation::Factor(1.0 / 3600.0)),
             ("mK", "K", Relation::Factor(1e-3)),
-            ("K", "degC", Relation::OtherZero),
-            ("degF", "degC", Relation::OtherZero),
-            ("degC", "K", Relation::OtherZero),
+            ("K", "degC", Relation::OtherZero { factor: 1.0, shift: -273.15 }),
+            ("mK", "degC", Relation::OtherZero { factor: 1e-3, shift: -273.15 }),
+            ("°C", "K", Relation::OtherZero { factor: 1.0, shift: 273.15 }),
             ("V", "rad/s", Relation::Other),
             ("Nm", "rad/s", Relation::Other),
             ("V", "degC", Relation::Other),
@@ -265,6 +312,12 @@ mod tests {
             ("V", "1", Relation::Unknown),
             ("", "V", Relation::Unknown),
             ("a", "A", Relation::Unknown),
+            ("1", "V", Relation::Unknown),
+            ("2", "1", Relation::Unknown),
+            ("t", "V", Relation::Unknown),
+            ("t", "kg", Relation::Factor(1e3)),
+            ("in", "Pa", Relation::Unknown),
+            ("%", "", Relation::Unknown),
         ] {
             match (relation(from, to), expected) {
                 (Relation::Factor(found), Relation::Factor(expected)) => {
@@ -272,6 +325,18 @@ mod tests {
                 }
                 (found, expected) => assert_eq!(found, expected, "{from} {to}"),
             }
+        }
+    }
+
+    /// Water freezes at 32 and boils at 212 degrees Fahrenheit.
+    #[test]
+    fn scales_of_temperature() {
+        for (from, to, pairs) in
+            [("degF", "degC", [(32.0, 0.0), (212.0, 100.0)]), ("°C", "°F", [(0.0, 32.0), (-40.0, -40.0)])]
+        {
+            let Relation::OtherZero { factor, shift } = relation(from, to) else { panic!("{from} {to}") };
+            // Differences of hundreds of kelvins, in double precision.
+            assert!(pairs.iter().all(|(a, b)| (factor * a + shift - b).abs() < 1e-12), "{from} {to}");
         }
     }
 

@@ -19,6 +19,19 @@ struct Entrant {
     estimate: Summary,
 }
 
+impl Entrant {
+    /// The estimate for a record that was fitted, by its place: records may have equal names.
+    fn of_record(&self, k: usize) -> Summary {
+        let (experiments, records) = (&self.estimate.experiments, &self.loaded.records);
+        let is_of = |(name, record): (&str, &Record)| {
+            name.strip_prefix(record.name()).is_some_and(|rest| rest.is_empty() || rest.starts_with(" #"))
+        };
+        let names = experiments.iter().map(|experiment| experiment.name.as_str());
+        let fitted = experiments.len() == records.len() && names.zip(records).all(is_of);
+        self.estimate.of_experiment(k).filter(|_| fitted).unwrap_or_else(|| self.estimate.clone())
+    }
+}
+
 pub fn run(one: &Compare, terminal: &Terminal) -> Result<Verdict, Failure> {
     if one.records.is_empty() {
         return Err("no record is named; those before --validation are fitted, those after it predicted".into());
@@ -29,14 +42,21 @@ pub fn run(one: &Compare, terminal: &Terminal) -> Result<Verdict, Failure> {
     let Some(first) = entrants.first() else { return Err("no model is named: --model MODEL".into()) };
     let mut compared = vec![];
     for (k, record) in first.loaded.records.iter().enumerate() {
-        compared
-            .push(predicted(Compared::estimation(record), &entrants, |entrant| Ok(entrant.loaded.records[k].clone()))?);
+        let of = |entrant: &Entrant| Ok((entrant.of_record(k), entrant.loaded.records[k].clone()));
+        compared.push(predicted(Compared::estimation(record), &entrants, of)?);
     }
     for path in &validation {
         let read = |entrant: &Entrant| {
             records::one(path, &entrant.loaded.model, &one.of_records, &one.of_model.values.initial, &terminal.silent())
         };
-        compared.push(predicted(Compared::validation(&read(first)?), &entrants, read)?);
+        let record = read(first)?;
+        // Parameters that each record has for itself tell nothing of another one.
+        if let Some(error) = entrants.iter().find_map(|entrant| entrant.estimate.of_record(&record).err()) {
+            terminal.remark(format_args!("{} is left out: {error}", path.display()));
+            continue;
+        }
+        let of = |entrant: &Entrant| Ok((entrant.estimate.clone(), read(entrant)?));
+        compared.push(predicted(Compared::validation(&record), &entrants, of)?);
     }
     let report = fit::report(&first.problem, &first.estimate, &first.loaded, &[])?;
     let mut short = Report { sections: vec![], severity: first.estimate.severity(), ..report.clone() };
@@ -84,14 +104,15 @@ fn entrant(name: &str, one: &Compare, files: &[PathBuf], terminal: &Terminal) ->
     Ok(Entrant { title, loaded, problem, estimate })
 }
 
-/// A record with what each model predicts of it.
+/// A record with what each model predicts of it, by the estimate that is for it.
 fn predicted(
     compared: Compared,
     entrants: &[Entrant],
-    record: impl Fn(&Entrant) -> Result<Record, Failure>,
+    of: impl Fn(&Entrant) -> Result<(Summary, Record), Failure>,
 ) -> Result<Compared, Failure> {
     let with = |compared: Compared, entrant: &Entrant| {
-        let prediction = entrant.problem.predict(&entrant.estimate, &record(entrant)?)?;
+        let (estimate, record) = of(entrant)?;
+        let prediction = entrant.problem.predict(&estimate, &record)?;
         Ok::<_, Failure>(compared.with(&entrant.title, &prediction)?)
     };
     entrants.iter().try_fold(compared, with)

@@ -33,12 +33,13 @@ pub fn one(
     prepared(read(path, model, layout, options, terminal)?, model, options, of_initial)
 }
 
-/// Reads the inputs alone, of a model that has any, and outputs from whose first sample the initial state is to be taken.
+/// Reads the inputs alone, of a model that has any, and, if `measured`, outputs from whose first sample the initial state is to be taken.
 pub fn inputs(
     path: &Path,
     model: &Model,
     options: &RecordOptions,
     of_initial: &[String],
+    measured: bool,
     terminal: &Terminal,
 ) -> Result<Record, Failure> {
     let mut layout = model.equations().layout().clone();
@@ -47,7 +48,9 @@ pub fn inputs(
     }
     let inputs = prepared(read(path, model, &layout, options, terminal)?, model, options, of_initial)?;
     match inputs.initial_state() {
-        Initial::FirstSample if layout.outputs.is_empty() => one(path, model, options, of_initial, terminal),
+        Initial::FirstSample if measured && layout.outputs.is_empty() => {
+            one(path, model, options, of_initial, terminal)
+        }
         _ => Ok(inputs),
     }
 }
@@ -133,7 +136,7 @@ fn file(path: &Path, model: &Model, layout: &Layout, options: &RecordOptions) ->
         file = file.column("t", column);
     }
     for (signal, unit) in &options.unit {
-        file = file.factor(signal, factor(signal, unit, layout)?);
+        file = in_unit(file, signal, unit, layout)?;
     }
     if let Some(unit) = &options.time_unit {
         file = file.factor("t", text::factor(unit, "s")?);
@@ -159,23 +162,15 @@ fn file(path: &Path, model: &Model, layout: &Layout, options: &RecordOptions) ->
     Ok(file)
 }
 
-/// What the numbers of a file are multiplied by.
-fn factor(signal: &str, unit: &str, layout: &Layout) -> Result<f64, Failure> {
+/// A file whose column of a signal has this unit, or is to be multiplied by this number.
+fn in_unit(file: DataFile, signal: &str, unit: &str, layout: &Layout) -> Result<DataFile, Failure> {
     if let Ok(factor) = number("", unit) {
-        return Ok(factor);
+        return Ok(file.factor(signal, factor));
     }
-    let all: Vec<_> = layout.inputs.iter().chain(&layout.outputs).collect();
-    let Some(quantity) = all.iter().find(|quantity| quantity.name == signal) else {
-        let available = all.iter().map(|quantity| quantity.name.clone()).collect();
-        return Err(greybox::Error::Unknown { what: "signal".into(), name: signal.into(), available }.into());
-    };
-    let factor = text::factor(unit, &quantity.unit)?;
-    if !text::begins_elsewhere(unit, &quantity.unit) {
-        return Ok(factor);
+    let mut all = layout.inputs.iter().chain(&layout.outputs);
+    if let Some(quantity) = all.find(|quantity| quantity.name == signal) {
+        // The error names what is wrong with the unit.
+        text::factor(unit, &quantity.unit)?;
     }
-    let of_signal = &quantity.unit;
-    Err(format!(
-        "--unit {signal}={unit}: it has another zero than `{of_signal}`; convert the column, or write the factor of differences, {signal}={factor}"
-    )
-    .into())
+    Ok(file.unit(signal, unit))
 }

@@ -3,7 +3,7 @@
 use greybox::text::renamed;
 
 /// Functions of the library, and the options that do the same, with what they are given.
-const NAMES: [(&str, &str); 21] = [
+const NAMES: [(&str, &str); 22] = [
     ("DataFile::factor(\"t\", ..)", "--time-unit"),
     ("DataFile::column", "--column {}"),
     ("DataFile::dates", "--date-order"),
@@ -11,6 +11,7 @@ const NAMES: [(&str, &str); 21] = [
     ("DataFile::fill, Record::from_series", "--fill"),
     ("DataFile::fill", "--fill {}"),
     ("DataFile::sample_time", "--sample-time {}"),
+    ("DataFile::unit", "--unit {}"),
     ("DataFile::zone", "--zone {}"),
     ("Experiment::between", "--between {}"),
     ("Experiment::initial", "--initial {}"),

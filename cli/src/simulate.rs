@@ -13,8 +13,9 @@ pub fn run(one: &Simulate, terminal: &Terminal) -> Result<Verdict, Failure> {
     let model = model(one.model.as_deref(), &one.of_model.constant, terminal)?;
     let layout = model.equations().layout();
     let path = convert::only(&one.records, "file with the inputs")?;
-    // Outputs need not be in the file.
-    let inputs = records::inputs(&path, &model, &one.of_records, &one.of_model.initial, terminal)?;
+    // Outputs need not be in the file; an estimate has an initial state.
+    let measured = one.estimate.is_none() || !one.of_model.initial.is_empty();
+    let inputs = records::inputs(&path, &model, &one.of_records, &one.of_model.initial, measured, terminal)?;
     let options = ModelOptions { values: one.of_model.clone(), ..Default::default() };
     let mut parameters = declared(&model, &options)?;
     let mut initial = None;
@@ -23,9 +24,12 @@ pub fn run(one: &Simulate, terminal: &Terminal) -> Result<Verdict, Failure> {
         if found.layout.parameters != layout.parameters {
             return Err(format!("{}: the estimate is of a model with other parameters", path.display()).into());
         }
-        let found = found.of_record(&inputs)?;
         // What the command line sets is kept.
         let said = |name: &str| one.of_model.set.iter().chain(&one.of_model.fix).any(|(known, _)| known == name);
+        let found = match found.of_record(&inputs) {
+            Err(_) if found.own_parameters().iter().all(|j| said(&found.parameters[*j].name)) => found,
+            own => own?,
+        };
         for (parameter, found) in parameters.iter_mut().zip(&found.parameters) {
             if !said(&found.name) {
                 *parameter = fixed(found.value);

@@ -112,7 +112,10 @@ class Record:
 def _in_python(text: str) -> str:
     """Give an error of the library's reader with the remedies that there are in Python."""
     for theirs, ours in (
-        (r'DataFile::factor\("(\w+)", ([^)]*)\), or 1 if', r"a frame in which `\1` is multiplied by \2, or by 1 if"),
+        (r'DataFile::factor\("([^"]+)", ([^)]*)\), or 1 if', r"a frame in which `\1` is multiplied by \2, or by 1 if"),
+        (r'DataFile::unit\("([^"]+)", ("[^"]+")\), which', r"a frame in which `\1` is converted from \2, which"),
+        (r', which converts it, or DataFile::factor\("[^"]+", 1\) if', r", or a frame as it stands if"),
+        (r'give DataFile::factor\("[^"]+", 1\) if', r"give a frame as it stands if"),
         (r"DataFile::column", 'columns={"signal": "column"}, or time="column"'),
         (r"DataFile::sample_time", "sample_time"),
         (r"DataFile::(\w+)", r"pandas.read_csv (here is no option \1)"),

@@ -85,8 +85,11 @@ pub fn derived_by(estimate: &Summary, experiment: usize, name: &str, graph: &Gra
 }
 
 fn of(estimate: &Summary, experiment: usize, name: &str, f: &dyn Fn(&[Dual<LANES>]) -> Dual<LANES>) -> Derived {
-    let of_all = || estimate.parameters.iter().map(|parameter| parameter.value).collect();
-    let values: Vec<f64> = estimate.experiments.get(experiment).map_or_else(of_all, |own| own.parameters.clone());
+    let own = estimate.of_experiment(experiment);
+    // No experiment of this place has the parameters that each has for itself.
+    let missing = if own.is_none() { estimate.own_parameters() } else { vec![] };
+    let of = own.as_ref().unwrap_or(estimate).parameters.iter().enumerate();
+    let values: Vec<f64> = of.map(|(j, of)| if missing.contains(&j) { f64::NAN } else { of.value }).collect();
     let unknown = |j: usize| {
         let own = |u: &Unknown| u.role == Role::Parameter(j) && u.experiment.is_none_or(|e| e == experiment);
         estimate.unknowns.iter().position(own)

@@ -1,8 +1,9 @@
 //! Minima at a kink of the cost: where a held input acts late by a whole number of samples, the slope with respect to the dead time jumps, and the cost may
 //! rise on both sides.
 
-use crate::optimize::{Domain, LeastSquares, LevenbergMarquardt, Linearization, Machine, Request};
-use crate::problem::{Objective, Round};
+use crate::optimize::{Domain, LeastSquares, LevenbergMarquardt, Linearization, Machine, Request, Stop};
+use crate::problem::{Objective, Role, Round};
+use crate::scaling::OwnSize;
 
 /// How far beside a kink slopes are taken, as a part of the unknown: searches were seen to end within 1e-9 of the kink, and over this distance the
 /// slope of a smooth cost changes little.
@@ -11,6 +12,8 @@ const BESIDE: f64 = 1e-5;
 const JUMP: f64 = 10.0;
 /// Most searches with unknowns kept at kinks: in the first one others may run into kinks of their own.
 const SEARCHES: usize = 3;
+/// Most trial steps of each, which begins near a minimum.
+const TRIALS: u64 = 200;
 
 /// The end of a round as a minimum, if the model has dead times and the cost a kink where no step lowers it: the unknowns whose slopes jump there are held, and
 /// the others searched. At the minimum that is found, the cost has to fall towards the kink from both sides. `None` where it is none.
@@ -20,12 +23,14 @@ pub(super) fn at_kink(objective: &Objective<'_>, round: &Round) -> Option<Round>
         return None;
     }
     let mut round = round.clone();
+    // An initial state moves no dead time.
+    let unknowns = objective.problem.unknowns.row.iter().enumerate();
+    let parameters: Vec<usize> =
+        unknowns.filter(|(_, unknown)| matches!(unknown.role, Role::Parameter(_))).map(|(i, _)| i).collect();
     for _ in 0..SEARCHES {
-        let slopes: Vec<Option<Slopes>> =
-            (0..round.coordinates.len()).map(|i| Slopes::beside(objective, &round.coordinates, i)).collect();
-        round.evaluations += 2 * round.coordinates.len() as u64;
-        let bends = |i: &usize| slopes[*i].is_some_and(|slopes| slopes.jump());
-        let kinks: Vec<usize> = (0..slopes.len()).filter(bends).collect();
+        round.evaluations += 2 * parameters.len() as u64;
+        let jumps = |i: &usize| Slopes::beside(objective, &round.coordinates, *i).is_some_and(Slopes::jump);
+        let kinks: Vec<usize> = parameters.iter().copied().filter(jumps).collect();
         if kinks.is_empty() {
             return None;
         }
@@ -77,12 +82,16 @@ impl Slopes {
 
 /// Goes on from where a round ended, within this domain.
 fn search(objective: &Objective<'_>, round: Round, domain: Domain) -> Round {
-    let mut machine: LevenbergMarquardt = LevenbergMarquardt::default();
+    let trials = objective.problem.settings.optimizer.most().min(TRIALS);
+    let mut machine = LevenbergMarquardt::new(Stop { iterations: trials, ..Stop::default() }, OwnSize);
     machine.begin(round.coordinates.clone(), domain);
-    let mut evaluations = round.evaluations;
+    let (mut evaluations, mut iterations) = (round.evaluations, round.iterations);
     let outcome = loop {
         match machine.request() {
-            Request::Linearize(x) => machine.tell(objective.linearize(x)),
+            Request::Linearize(x) => {
+                machine.tell(objective.linearize(x));
+                iterations += 1;
+            }
             Request::Curvature { x, along } => machine.tell_curvature(objective.curvature(x, along)),
             Request::Ended(outcome) => break outcome,
         }
@@ -90,5 +99,5 @@ fn search(objective: &Objective<'_>, round: Round, domain: Domain) -> Round {
     };
     let linear: Option<Linearization> = machine.linearization().cloned();
     let outcome = objective.control.named(outcome);
-    Round { coordinates: machine.place().to_vec(), linear, outcome, evaluations, ..round }
+    Round { coordinates: machine.place().to_vec(), linear, outcome, evaluations, iterations, ..round }
 }

@@ -42,7 +42,14 @@ impl Fit<'_, Equations> {
         let measured = |of: &Quantity| inputs.outputs().iter().find(|channel| first && channel.name == of.name);
         let of = |of: &Quantity| measured(of).map_or(vec![f64::NAN; inputs.len()], |channel| channel.values.to_vec());
         let outputs = self.model.layout().outputs.iter().map(of).collect();
-        let problem = self.of_inputs(inputs, outputs, initial)?;
+        let remedy = |error| match error {
+            Error::StateNotMeasured { experiment, reason, .. } if first => {
+                let remedy = "give the record its outputs at the first sample, or the initial state";
+                Error::StateNotMeasured { experiment, reason, remedy }
+            }
+            other => other,
+        };
+        let problem = self.of_inputs(inputs, outputs, initial).map_err(remedy)?;
         let start = problem.unknowns.start();
         let values = problem.in_units(&Control::NEVER).values_of(0, &start);
         if first {

@@ -75,7 +75,7 @@ use std::path::{Path, PathBuf};
 /// **Columns** go by name. Each input and output of the model has a column of its own name, with a unit behind it or without
 /// (`ud [V]`), unless [`column`](DataFile::column) says another. States need none; further columns are ignored. A value is
 /// `factor * cell + offset`, in the unit of the signal. Where the file says a unit that is known and not the signal's (rpm for rad/s, mA for
-/// A), it is refused until a [`factor`](DataFile::factor) is given; nothing is converted.
+/// A), it is refused until a [`unit`](DataFile::unit) or a [`factor`](DataFile::factor) is given; nothing is converted unasked.
 ///
 /// **Cells** stand between commas, semicolons, tabs, bars or single spaces, may be quoted, and may have white space around them. Numbers
 /// have a point or a comma, the same in the whole file. An output that was not measured is empty, `NaN`, `NA` or `null`; inputs and time
@@ -133,6 +133,8 @@ struct Column {
     signal: String,
     name: Option<String>,
     factor: Option<f64>,
+    /// The unit that its cells were said to have.
+    unit: Option<String>,
     offset: f64,
     reversed: bool,
     /// How it is filled in where it was not sampled.
@@ -142,7 +144,8 @@ struct Column {
 impl Column {
     fn new(signal: &str) -> Column {
         // Adding minus zero changes no number, not even minus zero.
-        Column { signal: signal.to_owned(), name: None, factor: None, offset: -0.0, reversed: false, fill: None }
+        let signal = signal.to_owned();
+        Column { signal, name: None, factor: None, unit: None, offset: -0.0, reversed: false, fill: None }
     }
 
     fn name(&self) -> &str {
@@ -188,6 +191,12 @@ impl DataFile {
     /// Factor of the cells of `signal`, such as [`units::RPM`](crate::units::RPM); positive.
     pub fn factor(self, signal: &str, factor: f64) -> Self {
         self.with(signal, |column| column.factor = Some(factor))
+    }
+
+    /// Unit of the cells of `signal`, whatever the file says: they are converted to the signal's. `unit("w", "rpm")` multiplies by 0.1047 for
+    /// `rad/s`; `unit("temp", "degF")` for `degC` subtracts 32 first.
+    pub fn unit(self, signal: &str, unit: &str) -> Self {
+        self.with(signal, |column| column.unit = Some(unit.to_owned()))
     }
 
     /// Offset added to `signal` after its factor, in the signal's unit.

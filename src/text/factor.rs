@@ -1,4 +1,4 @@
-//! [`factor`] and [`begins_elsewhere`]: from one unit to another.
+//! [`factor`]: from one unit to another.
 
 use super::remark::Error;
 use crate::unit::{NoUnit, Relation, Unit, relation};
@@ -18,8 +18,10 @@ use std::collections::BTreeMap;
 /// # Ok::<(), greybox::text::Error>(())
 /// ```
 pub fn factor(from: &str, to: &str) -> Result<f64, Error> {
-    if let Relation::Factor(factor) = relation(from, to) {
-        return Ok(factor);
+    match relation(from, to) {
+        Relation::Factor(factor) | Relation::OtherZero { factor, .. } => return Ok(factor),
+        Relation::Same => return Ok(1.0),
+        _ => {}
     }
     let read = |text: &str| {
         Unit::read(text, &BTreeMap::new()).map_err(|no| {
@@ -37,14 +39,4 @@ pub fn factor(from: &str, to: &str) -> Result<f64, Error> {
             Err(Error::Unit(format!("`{from}` is in {a}, `{to}` is in {b}; neither is a multiple of the other")))
         }
     }
-}
-
-/// Whether two units are scales of temperature that begin at different zeros, so that no factor leads from one to the other.
-///
-/// ```
-/// use greybox::text::begins_elsewhere;
-/// assert!(begins_elsewhere("K", "degC") && !begins_elsewhere("mK", "K") && !begins_elsewhere("degC", "°C"));
-/// ```
-pub fn begins_elsewhere(from: &str, to: &str) -> bool {
-    relation(from, to) == Relation::OtherZero
 }

@@ -154,6 +154,33 @@ fn a_record_has_the_parameters_of_the_experiment_of_its_name() {
         (second.standard_error.unwrap() / estimate.covariance.standard_error(of) - 1.0).abs() < 1e-12,
         "{second:?}"
     );
+    // The same of the estimate for that experiment alone, whose parameters say how well they are known there.
+    let own = estimate.summary().of_experiment(1).unwrap();
+    assert_eq!(derived_by(&own, 0, "b", &graph, b), second);
+    assert_eq!(own.parameters[1].knowledge, estimate.unknowns[of].knowledge);
+    // There is no third one, and `b` is none of all; `c` is.
+    let missing = derived_by(estimate.summary(), 2, "b", &graph, b);
+    assert!(missing.value.is_nan() && missing.standard_error.is_none(), "{missing:?}");
+    let c = graph.leaf(Leaf::Parameter(2));
+    assert_eq!(derived_by(estimate.summary(), 2, "c", &graph, c).value, estimate.parameters.c);
+}
+
+/// What a user changes in a summary is what predictions and derived quantities are of: shared parameters by their values, those that experiments
+/// have for themselves by the experiments.
+#[test]
+fn an_estimate_may_be_edited() {
+    let records = [record(3, 2.0, 0.4).named("cold"), record(4, 5.0, 0.4).named("warm")];
+    let parameters = Cubic { a: free(0.0), b: free(0.0).per_experiment(), c: free(0.1) };
+    for records in [&records[..], &records[..1]] {
+        let mut edited = Fit::new(&Polynomial, records).parameters(parameters).run().unwrap().into_summary();
+        edited.parameters[0].value = 7.0;
+        assert_eq!(edited.of_record(records[0].record()).unwrap().parameters[0].value, 7.0);
+        let mut graph = Graph::default();
+        let a = graph.leaf(Leaf::Parameter(0));
+        assert_eq!(derived_by(&edited, 0, "a", &graph, a).value, 7.0);
+        let b = graph.leaf(Leaf::Parameter(1));
+        assert_eq!(derived_by(&edited, 0, "b", &graph, b).value, edited.experiments[0].parameters[1]);
+    }
 }
 
 /// Refits of resampled residuals scatter as the standard errors of a model that is linear say: of 400 to 3.5 %, here four times

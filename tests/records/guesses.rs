@@ -3,7 +3,8 @@
 
 use crate::pmsm::{Currents, Drive, Pmsm};
 use crate::refused::says;
-use greybox::{DataFile, Experiment, ExperimentOf, Time, TimeSource};
+use greybox::layout::Layout;
+use greybox::{DataFile, Experiment, ExperimentOf, Model, Scalar, Time, TimeSource};
 use std::path::PathBuf;
 
 fn file(name: &str, text: impl AsRef<[u8]>) -> PathBuf {
@@ -53,6 +54,16 @@ fn a_file_is_read_as_it_stands() {
                 .replace("\n1,", "\n1000,")
                 .replace("\n2,", "\n2000,"),
             "cells between \",\", a row of units, time \"t\" in ms; `iq` in \"Ampere\" taken as \"A\"",
+        ),
+        (
+            "units_row_of_ones",
+            plain.replace("iq\n", "iq\ns,V,1,A,A\n"),
+            "cells between \",\", a row of units, time \"t\" in s; `w` in \"1\" taken as \"rad/s\"",
+        ),
+        (
+            "indexes_in_names",
+            plain.replace("t,ud,w,id,iq", "t,ud[1],w(t),id(2),iq"),
+            "cells between \",\", time \"t\" in s; `ud` in \"1\" taken as \"V\"; `w` in \"t\" taken as \"rad/s\"; `id` in \"2\" taken as \"A\"",
         ),
         (
             "units_in_names",
@@ -128,6 +139,45 @@ fn a_column_in_another_unit_is_refused() {
     // Also where the column is named with its unit.
     says(DataFile::new(&path).column("w", "w [rpm]").read(&Pmsm), &["column `w [rpm]`", "0.10471975511965977"]);
     assert_eq!(DataFile::new(path).factor("w", 0.5).read(&Pmsm).unwrap().input(0).w, 1.0);
+}
+
+/// Scales of temperature begin at other zeros: none is taken for another, and the unit that is said converts it. Other units likewise.
+#[test]
+fn a_unit_that_is_said_converts() {
+    greybox::signals! { struct Warmth { temp: "degC" } }
+    let layout = |unit: &str| {
+        let mut layout = Layout::of::<Room>();
+        layout.outputs[0].unit = unit.to_owned();
+        layout
+    };
+    struct Room;
+    impl Model for Room {
+        type State = greybox::Nothing;
+        type Input = greybox::Nothing;
+        type Output = Warmth;
+        type Parameters = Warmth;
+        fn output<S: Scalar>(&self, _t: S, _x: &greybox::Nothing, _u: &greybox::Nothing, p: &Warmth<S>) -> Warmth<S> {
+            *p
+        }
+    }
+    let read = |unit: &str| DataFile::new(file("temperature", format!("t,temp [{unit}]\n0,300\n1,301\n2,302\n")));
+    for (unit, model, cell) in [("K", "degC", 300.0 - 273.15), ("degC", "K", 573.15), ("degF", "degC", 268.0 / 1.8)] {
+        let remedy = format!("their zeros differ: give DataFile::unit(\"temp\", \"{unit}\"), which converts it");
+        says(read(unit).read_record(&layout(model)), &[&format!("column `temp [{unit}]`"), &remedy]);
+        let converted = read(unit).unit("temp", unit).read_record(&layout(model)).unwrap();
+        assert!((converted.outputs()[0].values[0] - cell).abs() < 1e-12, "{unit} {model}");
+    }
+    let shifted = read("K").offset("temp", -273.15).read_record(&layout("degC")).unwrap();
+    assert_eq!(shifted.outputs()[0].values[0], 300.0 - 273.15);
+    // A degree Fahrenheit is smaller.
+    says(read("degF").offset("temp", -17.8).read_record(&layout("degC")), &["their zeros differ"]);
+    let path = file("said_units", "t,ud,w,id,iq\n0,1,60,3,4\n1000,1,60,3,4\n");
+    let drive = || DataFile::new(&path);
+    let record = drive().unit("w", "rpm").unit("t", "ms").read(&Pmsm).unwrap();
+    assert!((record.input(0).w / std::f64::consts::TAU - 1.0).abs() < 1e-15 && record.time(1) == 1.0);
+    says(drive().unit("w", "V").read(&Pmsm), &["column `w` is in \"V\"", "neither is a multiple"]);
+    says(drive().unit("w", "ticks").read(&Pmsm), &["is not known: give DataFile::factor(\"w\", ..)"]);
+    says(drive().unit("w", "rpm").factor("w", 2.0).read(&Pmsm), &["a factor, 2, and a unit, rpm"]);
 }
 
 #[test]

@@ -93,13 +93,18 @@ impl Form {
         let (at, mut found) = found.unwrap_or((0, first));
         if let Some(below) = lines.get(at + 1) {
             let units = cells(file, separator, below.text);
+            let of_wanted = |cell: &(&String, &String)| wanted.iter().any(|want| names(cell.1, want));
             let texts = |cells: &[String]| {
-                let mut among =
-                    cells.iter().zip(&found.names).filter(|(_, name)| wanted.iter().any(|want| names(name, want)));
-                among.clone().next().is_some() && among.all(|(cell, _)| !cell.is_empty() && !is_value(cell))
+                let mut among = cells.iter().zip(&found.names).filter(of_wanted).map(|(cell, _)| cell).peekable();
+                among.peek().is_some() && among.all(|cell| !cell.is_empty() && !is_value(cell))
             };
             let after = lines.get(at + 2).map(|line| cells(file, separator, line.text));
-            let guessed = units.len() == found.names.len() && texts(&units) && after.is_some_and(|row| !texts(&row));
+            // The unit of a ratio is written as a number: each cell that is none stands above one.
+            let above = |(unit, below): (&String, &String)| unit == "1" || !is_value(unit) && is_value(below);
+            let units_and_ones =
+                |after: &[String]| units.iter().any(|unit| unit != "1") && units.iter().zip(after).all(above);
+            let is_row = |after: Vec<String>| !texts(&after) && (texts(&units) || units_and_ones(&after));
+            let guessed = units.len() == found.names.len() && !wanted.is_empty() && after.is_some_and(is_row);
             if file.units_row || guessed {
                 found.units = Some(units);
                 found.skipped = lines.get(at + 2).map_or(below.number + 1, |line| line.number);

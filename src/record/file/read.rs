@@ -145,7 +145,7 @@ impl DataFile {
     pub(super) fn check(&self, layout: &Layout) -> Result<(), Error> {
         let signals = layout.inputs.iter().chain(&layout.outputs).map(|signal| signal.name.as_str());
         let known = || signals.clone().chain(["t"]);
-        for Column { signal, factor, offset, fill, .. } in &self.columns {
+        for Column { signal, factor, unit, offset, fill, .. } in &self.columns {
             if !known().any(|name| name == signal) {
                 let available = known().map(|name| (*name).to_owned()).collect();
                 return Err(Error::UnknownSignal { signal: signal.clone(), available });
@@ -153,6 +153,10 @@ impl DataFile {
             if let Some(value) = factor.filter(|factor| !(*factor > 0.0 && factor.is_finite())) {
                 let what = format!("the factor of `{signal}` (DataFile::reversed turns a sign)");
                 return Err(Error::NotPositive { what, value });
+            }
+            if let Some((factor, unit)) = factor.zip(unit.as_ref()) {
+                let text = format!("`{signal}` has a factor, {factor}, and a unit, {unit}; leave one of them out");
+                return Err(Error::Option(text));
             }
             if let (Some(_), false) = (fill, layout.inputs.iter().any(|input| input.name == *signal)) {
                 let text = format!("DataFile::fill is for inputs, which `{signal}` is not; outputs may be missing");
@@ -203,33 +207,32 @@ impl DataFile {
         let name = &names[column];
         // A signal may have brackets in its own name.
         let written = split_unit(name).1.filter(|_| *name != signal.name);
-        if let (None, Some(file)) = (said.factor, written.or_else(|| below(column))) {
-            let (file, model) = (file.to_owned(), signal.unit.clone());
-            let factor = match relation(&file, &model) {
-                Relation::Same => None,
-                // An offset was said.
-                Relation::OtherZero if said.offset != 0.0 => None,
-                Relation::Factor(factor) => Some(Some(factor)),
-                Relation::OtherZero | Relation::Other => Some(None),
-                Relation::Unknown => {
-                    if !file.is_empty() {
-                        units.push((signal.name.clone(), file.clone(), model.clone()));
-                    }
-                    None
-                }
+        let (mut factor, mut offset) = (said.factor.unwrap_or(1.0), said.offset);
+        let of_file = said.unit.as_deref().or(written).or_else(|| below(column));
+        if let Some(file) = of_file.filter(|_| said.factor.is_none()) {
+            let refused = |factor: Option<f64>| {
+                let (path, column, signal_name) = (self.path.clone(), name.clone(), signal.name.clone());
+                let (file, model) = (file.into(), signal.unit.as_str().into());
+                Err(Error::Unit { path, column, file, signal: signal_name, model, factor })
             };
-            if let Some(factor) = factor {
-                let (path, column, signal) = (self.path.clone(), name.clone(), signal.name.clone());
-                return Err(Error::Unit { path, column, file: file.into(), signal, model: model.into(), factor });
+            // Without a unit a signal is a number, if a column is said to be converted to it.
+            let model = if signal.unit.is_empty() && said.unit.is_some() { "1" } else { &signal.unit };
+            match (relation(file, model), said.unit.is_some()) {
+                (Relation::Same, _) => {}
+                (Relation::Factor(found), true) => factor = found,
+                (Relation::OtherZero { factor: found, shift }, true) => (factor, offset) = (found, offset + shift),
+                // An offset was said, and kelvins are as large as degrees Celsius.
+                (Relation::OtherZero { factor, .. }, false) if factor == 1.0 && offset != 0.0 => {}
+                (Relation::Unknown, false) => {
+                    if !file.is_empty() {
+                        units.push((signal.name.clone(), file.to_owned(), signal.unit.clone()));
+                    }
+                }
+                (Relation::Factor(found), false) => return refused(Some(found)),
+                _ => return refused(None),
             }
         }
-        let factor = said.factor.unwrap_or(1.0);
-        Ok(Source {
-            column,
-            factor: if said.reversed { -factor } else { factor },
-            offset: said.offset,
-            fill: said.fill,
-        })
+        Ok(Source { column, factor: if said.reversed { -factor } else { factor }, offset, fill: said.fill })
     }
 
     /// The error of a cell that is no number, or not a finite one.

@@ -108,7 +108,7 @@ impl DataFile {
         if name.is_empty() && said.name.is_none() {
             return self.place(names, "t").map(|_| None);
         }
-        let written = split_unit(name).1.or_else(|| suffix(name)).or(below).map(str::trim);
+        let written = said.unit.as_deref().or(split_unit(name).1).or_else(|| suffix(name)).or(below).map(str::trim);
         let written = written.filter(|text| !NO_UNITS.contains(&text.to_lowercase().as_str()));
         let named = written.and_then(time_unit);
         let remedy = "say how many seconds one is by DataFile::factor(\"t\", ..)";
