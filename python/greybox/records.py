@@ -16,7 +16,7 @@ from greybox.errors import Error
 from greybox.files import TEXT, read
 from greybox.frames import Array, Frame, Kind, is_readonly, rename
 from greybox.model import Equations
-from greybox.parameters import Parameter, declared
+from greybox.parameters import Parameter, said
 from greybox.signals import Signals, named
 
 __all__ = ["Hold", "Initial", "Record", "filled", "framed", "kind_of", "opened", "records"]
@@ -51,8 +51,14 @@ class Record:
         The inputs between samples: constant, as a digital controller commands them, or straight lines, as measured quantities go.
         Inputs that a mapping leaves out, and all without one, are as a model file says, or constant.
     initial : {"estimated", "first", "steady"} or mapping from str to Parameter
-        The state at the first sample: estimated, computed from the first sample, or declared for each state by
-        :func:`~greybox.free` and :func:`~greybox.fixed`. Without it, as a model file says, or estimated.
+        The state at the first sample: estimated, computed from the first sample, or declared by :func:`~greybox.free` and
+        :func:`~greybox.fixed`; states that a mapping leaves out are as a model file declares them, or estimated from zero on. Without
+        it, as a model file says, or estimated.
+
+    Raises
+    ------
+    Error
+        If both `time` and `sample_time` are given.
     """
 
     data: Any
@@ -103,8 +109,9 @@ class Record:
         return self._said(equations, _core.Record(equations.core, name, time, inputs, outputs))
 
     def _said(self, equations: Equations, record: _core.Record) -> _core.Record:
-        given = self.initial
-        initial = given if given is None or isinstance(given, str) else declared(given, _states(equations), "initial state of")
+        # A mapping of nothing says nothing.
+        given = None if self.initial == {} else self.initial
+        initial = given if given is None or isinstance(given, str) else said(given, _states(equations), "initial state of")
         hold = self.hold if self.hold is None or isinstance(self.hold, str) else dict(self.hold)
         return equations.prepared(record).said(hold, initial)
 
