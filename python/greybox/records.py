@@ -69,6 +69,10 @@ class Record:
     hold: Hold | None = None
     initial: Initial | None = None
 
+    def __post_init__(self) -> None:
+        if self.time is not None and self.sample_time is not None:
+            raise Error(f"time={self.time!r} and sample_time={self.sample_time!r} both give the time of the samples; leave one out")
+
     def core(self, equations: Equations, name: str, *, outputs: bool = True) -> _core.Record:
         """Give the record as the library takes it. Without `outputs`, those that the frame lacks are missing measurements."""
         inputs, measured = named(equations.inputs, "inputs"), named(equations.outputs, "outputs")

@@ -118,6 +118,7 @@ def test_progress(capsys: pytest.CaptureFixture[str]) -> None:
     assert "fleet" in capsys.readouterr().err
 
 
+    ({"by": "which", "k": gb.free(1.0), "sample_time": 0.1, "time": "t"}, "both give the time of the samples; leave one out"),
 def test_a_plan_pickles() -> None:
     from greybox.fleets import plan
 
