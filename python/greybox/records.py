@@ -76,11 +76,11 @@ class Record:
     def core(self, equations: Equations, name: str, *, outputs: bool = True) -> _core.Record:
         """Give the record as the library takes it. Without `outputs`, those that the frame lacks are missing measurements."""
         inputs, measured = named(equations.inputs, "inputs"), named(equations.outputs, "outputs")
-        data = opened(self.data)
+        data, name = opened(self.data), self.name or (Path(self.data).name if is_path(self.data) else name)
         if isinstance(data, Path):
             columns_ = {**(self.columns or {}), **({} if self.time is None else {"t": self.time})}
             try:
-                record = _core.Record.from_csv(equations.core, self.name or data.name, data, columns_, self.sample_time)
+                record = _core.Record.from_csv(equations.core, name, data, columns_, self.sample_time)
             except Error as error:
                 raise Error(_in_python(str(error))) from None
             return self._said(equations, record)
@@ -99,7 +99,7 @@ class Record:
             _check_lengths({**{of[signal]: column for signal, column in {**columns, **found}.items()}}, time)
             missing = np.full(len(time), np.nan)
             given = {**columns, **{signal: found.get(signal, missing) for signal in measured}}
-            return self.of(equations, self.name or name, time, {of[signal]: _shared(one) for signal, one in given.items()})
+            return self.of(equations, name, time, {of[signal]: _shared(one) for signal, one in given.items()})
         except Error as error:
             if self.name and self.name not in str(error):
                 raise Error(f"record `{self.name}`: {error}") from None
@@ -134,20 +134,25 @@ def _in_python(text: str) -> str:
 
 def opened(data: Any) -> Any:
     """Give the frame in a file, where a path stands in its place; of a text file the path, which the compiled library reads."""
-    if not isinstance(data, (str, os.PathLike)):
+    if not is_path(data):
         return data
     path = Path(data)
     return path if path.suffix.lower() in TEXT else read(path)
 
 
+def is_path(data: Any) -> bool:
+    """Whether the path of a file stands in the place of data."""
+    return isinstance(data, (str, os.PathLike))
+
+
 def framed(data: Any) -> Any:
     """Give data as a frame that is opened once, as a stream has to be; a path stays one."""
-    return data if isinstance(data, (str, os.PathLike)) else Frame(data)
+    return data if is_path(data) else Frame(data)
 
 
 def kind_of(data: Any) -> Kind:
     """Give what makes a frame of the same kind; dicts where the data are a path."""
-    return dict if isinstance(data, (str, os.PathLike)) else Frame(data).kind
+    return dict if is_path(data) else Frame(data).kind
 
 
 def _states(equations: Equations) -> Signals:
