@@ -129,7 +129,7 @@ pub struct RecordOptions {
     #[arg(long, value_name = "ZONE")]
     pub zone: Option<String>,
     /// Time from a constant sample time (s) instead of a column.
-    #[arg(long, value_name = "SECONDS", conflicts_with = "time")]
+    #[arg(long, value_name = "SECONDS", conflicts_with_all = ["time", "time_unit", "date_order", "zone"])]
     pub sample_time: Option<f64>,
     /// How an input behaves between samples: `w=first` (a straight line), `ud=zero` (held).
     #[arg(long, value_name = "INPUT=HOLD", value_parser = assignment)]

@@ -66,8 +66,8 @@ pub fn run(one: &Fleet, terminal: &Terminal) -> Result<Verdict, Failure> {
         reader.add_errors(&mut table, terminal)?;
         // What Ctrl-C ended is no answer; the same command gives it.
         let is_whole = answer.as_ref().is_ok_and(|found| found.outcome != Outcome::Cancelled);
-        if let Some((name, _)) = reader.next().filter(|_| is_whole || !terminal.stopped()) {
-            let row = Row::of(name, answer.as_ref().map_err(ToString::to_string));
+        if let Some((name, Ok(samples))) = reader.next().filter(|_| is_whole || !terminal.stopped()) {
+            let row = Row::of(name, samples, answer.as_ref().map_err(ToString::to_string));
             table.add(row, terminal)?;
             bar.set_message(format!("{} records, files", table.rows().len()));
         }
@@ -120,8 +120,8 @@ struct Reader<'a> {
     one: &'a Fleet,
     model: &'a Model,
     quiet: &'a Terminal,
-    /// Records in the order read. `Some(error)`: could not be read, so the fit gives no answer for it; `None`: an answer will come.
-    waiting: RefCell<VecDeque<(Name, Option<String>)>>,
+    /// Records in the order read. An error: could not be read, so the fit gives no answer for it; how many samples: an answer will come.
+    waiting: RefCell<VecDeque<(Name, Result<usize, String>)>>,
     /// The files that were read.
     tried: RefCell<HashSet<String>>,
 }
@@ -147,23 +147,20 @@ impl Reader<'_> {
 
     /// Puts a name into the queue, and hands its record on.
     fn wait(&self, name: Name, record: Result<Record, String>) -> Option<Record> {
-        let (record, error) = match record {
-            Ok(record) => (Some(record), None),
-            Err(error) => (None, Some(error)),
-        };
-        self.waiting.borrow_mut().push_back((name, error));
-        record
+        let samples = record.as_ref().map(Record::len).map_err(String::clone);
+        self.waiting.borrow_mut().push_back((name, samples));
+        record.ok()
     }
 
-    fn next(&self) -> Option<(Name, Option<String>)> {
+    fn next(&self) -> Option<(Name, Result<usize, String>)> {
         self.waiting.borrow_mut().pop_front()
     }
 
     /// Adds the rows of records that will have no answer, up to the next that will have one.
     fn add_errors(&self, table: &mut Table, terminal: &Terminal) -> Result<(), Failure> {
-        let is_error = || self.waiting.borrow().front().is_some_and(|(_, error)| error.is_some());
+        let is_error = || self.waiting.borrow().front().is_some_and(|(_, samples)| samples.is_err());
         while is_error() {
-            if let Some((name, Some(error))) = self.next() {
+            if let Some((name, Err(error))) = self.next() {
                 table.add(Row::failed(name, error), terminal)?;
             }
         }

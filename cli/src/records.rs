@@ -142,11 +142,11 @@ fn file(path: &Path, model: &Model, layout: &Layout, options: &RecordOptions) ->
         file = file.factor("t", text::factor(unit, "s")?);
     }
     if let Some(step) = options.sample_time {
-        if let Some((_, column)) = options.column.iter().find(|(signal, _)| signal == "t") {
-            return Err(format!(
-                "--sample-time {step}: --column t={column} gives the time, too; leave one of them out"
-            )
-            .into());
+        for (option, said) in [("column", &options.column), ("unit", &options.unit)] {
+            if let Some((_, text)) = said.iter().find(|(signal, _)| signal == "t") {
+                let both = format!("--sample-time {step} and --{option} t={text}");
+                return Err(format!("{both}: the time is from one of them; leave the other out").into());
+            }
         }
         file = file.sample_time(step);
     }

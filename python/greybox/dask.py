@@ -59,7 +59,14 @@ def fleet(
     ------
     Error
         If a column is missing, or a parameter is not declared. What is wrong with a record is the reason in its row.
+    TypeError
+        If the frame is none of Dask.
     """
+    if not hasattr(frame, "map_partitions"):
+        raise TypeError(
+            f"{type(frame).__module__}.{type(frame).__name__} is no frame of Dask; fit it on this machine by gb.fleet, or hand over "
+            "dask.dataframe.from_pandas(frame, npartitions=...)"
+        )
     import pandas as pd
 
     if given.get("sample_time") is not None:

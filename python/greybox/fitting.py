@@ -63,10 +63,10 @@ def fit(
     time, sample_time, columns, hold, initial
         Of the frames, as in :class:`Record`, which can say them for each.
     noise : mapping from str to float, or "covariance", optional
-        The standard deviation of the noise of each output, in its unit; without it, it is estimated. ``"covariance"`` estimates it
-        with the correlations between outputs.
+        The standard deviation of the noise of outputs, in their units; that of others is as a model file says, or estimated.
+        ``"covariance"`` estimates it with the correlations between outputs.
     input_noise : mapping from str to float, optional
-        The standard deviation of the noise of each input. It changes no estimate: the bias that it causes is estimated, and a
+        The standard deviation of the noise of inputs; others have none. It changes no estimate: the bias that it causes is estimated, and a
         warning names it.
     loss : str, optional
         What errors cost: ``"squared"`` (the default), or, against outliers, ``"huber"``, ``"soft-l1"``, ``"cauchy"``, ``"tukey"``, with

@@ -104,6 +104,8 @@ class Plan:
             raise Error(f"there is no column `{missing[0]}`; the frame has: {near(missing[0], frame.names)}")
         keys = [frame.values(name) for name in self.by]
         places, firsts = _groups(keys)
+        of_record = {name: frame.rows(name, firsts) for name in self.by}
+        labels = [", ".join(map(str, one)) for one in zip(*(_list(key) for key in of_record.values()), strict=True)]
         columns = {name: frame.column(name, name) for name in self._signals()}
         readonly = {name: is_readonly(column) for name, column in columns.items()}
         step = self.record.sample_time
@@ -115,11 +117,10 @@ class Plan:
             if ordered and step is None and (here[1:] < here[:-1]).any():
                 order = np.argsort(here, kind="stable")
                 rows, here = (np.arange(rows.start, rows.stop) if isinstance(rows, slice) else rows)[order], here[order]
-            label = ", ".join(str(key[firsts[k]]) for key in keys)
             # A part of an array that nothing writes to is shared; rows that are gathered are a copy already.
             part = {name: (column[rows], readonly[name] or not isinstance(rows, slice)) for name, column in columns.items()}
             try:
-                records.append(self.record.of(self.equations, label, seconds(here, what), part))
+                records.append(self.record.of(self.equations, labels[k], seconds(here, what), part))
             except Error as error:
                 failed[k] = str(error)
         with Progress(progress, "fleet", len(records)) as shown:
@@ -129,7 +130,7 @@ class Plan:
             estimate, reason = (None, failed[k]) if k in failed else next(answers)
             for name, value in self._row(estimate, reason, _length(rows)).items():
                 found[name].append(value)
-        return {**{name: key[firsts] for name, key in zip(self.by, keys, strict=True)}, **found}
+        return {**of_record, **found}
 
     def _row(self, estimate: _core.Estimate | None, reason: str | None, samples: int) -> dict[str, Any]:
         row: dict[str, Any] = {name: float("nan") if kind is float else "" for name, kind in self.columns().items()}
@@ -145,6 +146,12 @@ class Plan:
         codes = dict.fromkeys(code for code, severity, _ in estimate.warnings if severity != "usable")
         row |= {"verdict": VERDICTS[estimate.severity], "outcome": estimate.outcome[0], "warnings": " ".join(codes)}
         return row
+
+
+def _list(column: Any) -> list[Any]:
+    """Give the entries of a column of any kind; Arrow and polars have another name for that than NumPy and pandas."""
+    entries: list[Any] = next(getattr(column, name) for name in ("tolist", "to_pylist", "to_list") if hasattr(column, name))()
+    return entries
 
 
 #: The rows of one record: a part of the frame, or here and there.

@@ -86,6 +86,15 @@ class Frame:
             return np.array(column.to_list(), dtype=object)
         return np.asarray(column.to_numpy())
 
+    def rows(self, name: str, rows: Any) -> Any:
+        """Give some rows of a column as the frame has it, with its zone where it has one."""
+        if self._arrays is not None:
+            return np.asarray(self._arrays[name])[rows]
+        import narwhals as nw
+
+        # The index of pandas has the places of the rows in the frame.
+        return nw.maybe_reset_index(self._frame.get_column(name)[rows]).to_native()
+
     def time(self, name: str | None, sample_time: float | None, rows: int) -> Array:
         """Give the time of each row in seconds; of dates, since the first.
 

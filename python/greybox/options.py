@@ -13,7 +13,7 @@ from greybox.signals import Signals, named, near
 
 __all__ = ["Noise", "Options", "settings", "whole"]
 
-#: What is said of the noise of the outputs: a standard deviation for each, or that the covariance of all is estimated.
+#: What is said of the noise of the outputs: standard deviations by name, or that the covariance of all is estimated.
 Noise: TypeAlias = "Mapping[str, float] | Literal['covariance']"
 
 
@@ -23,7 +23,7 @@ def _name(what: str, text: str | None) -> str | None:
     return text
 
 
-def _levels(what: str, given: Mapping[str, float] | None, signals: Signals) -> list[float] | None:
+def _levels(what: str, given: Mapping[str, float] | None, signals: Signals) -> list[tuple[str, float]] | None:
     if given is None:
         return None
     if not isinstance(given, Mapping):
@@ -32,10 +32,7 @@ def _levels(what: str, given: Mapping[str, float] | None, signals: Signals) -> l
     for name in given:
         if name not in signals:
             raise Error(f"{what} names `{name}`, and the model has: {near(name, signals)}")
-    missing = [name for name in signals if name not in given]
-    if missing:
-        raise Error(f"{what} lacks `{missing[0]}`; give a standard deviation for each of {', '.join(signals)}")
-    return [float(given[name]) for name in signals]
+    return [(name, float(given[name])) for name in signals if name in given]
 
 
 def whole(what: str, value: Any, least: int) -> int:
@@ -75,11 +72,15 @@ class Options(TypedDict, total=False):
 
 def settings(equations: Equations, given: Options) -> dict[str, Any]:
     """Give the options as the compiled library takes them; those that are not given are the model's."""
-    given = Options(**{**equations.defaults(), **{name: value for name, value in given.items() if value is not None}})  # type: ignore[typeddict-item]
+    defaults = equations.defaults()
+    given = Options(**{**defaults, **{name: value for name, value in given.items() if value is not None}})  # type: ignore[typeddict-item]
     inputs, outputs = named(equations.inputs, "inputs"), named(equations.outputs, "outputs")
     noise, starts = given.get("noise"), given.get("starts")
     if isinstance(noise, str) and noise != "covariance":
         raise Error(f'noise is {noise!r}; give a standard deviation for each output, {{"name": 0.1}}, or "covariance"')
+    if isinstance(noise, Mapping):
+        # Of outputs that are left out, that of a model file stays.
+        noise = {**(defaults.get("noise") or {}), **noise}
     if starts is not None:
         starts = whole("starts", starts, 1)
     if given.get("staged") and given.get("multiple_shooting"):

@@ -60,6 +60,21 @@ def declared(given: Mapping[str, Any], names: Signals, what: str = "parameter") 
     Error
         If one is missing, unknown, or not declared by :func:`free` or :func:`fixed`.
     """
+    found = said(given, names, what)
+    missing = [name for name in names if name not in given]
+    if missing:
+        raise Error(f"{what} `{missing[0]}` is not declared; write {missing[0]}=gb.free(start) to estimate it, or gb.fixed(value)")
+    return [one for one in found if one is not None]
+
+
+def said(given: Mapping[str, Any], names: Signals, what: str) -> list[Parameter | None]:
+    """Give the declaration of each quantity that has one, in order.
+
+    Raises
+    ------
+    Error
+        If one is unknown, or not declared by :func:`free` or :func:`fixed`.
+    """
     if not isinstance(given, Mapping):
         raise Error(f"{what} {given!r}: give the declaration of each by its name")
     for name, value in given.items():
@@ -68,10 +83,7 @@ def declared(given: Mapping[str, Any], names: Signals, what: str = "parameter") 
         if not isinstance(value, Parameter):
             shown = f"{value!r}" if isinstance(value, (int, float)) else type(value).__name__
             raise Error(f"{what} `{name}` is {shown}; write gb.free({shown}) to estimate it from there, or gb.fixed({shown}) to keep it")
-    missing = [name for name in names if name not in given]
-    if missing:
-        raise Error(f"{what} `{missing[0]}` is not declared; write {missing[0]}=gb.free(start) to estimate it, or gb.fixed(value)")
-    return [given[name] for name in names]
+    return [given.get(name) for name in names]
 
 
 def together(parameters: Mapping[str, Parameter] | None, by_name: Mapping[str, Parameter], options: Iterable[str]) -> dict[str, Parameter]:

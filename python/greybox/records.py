@@ -16,7 +16,7 @@ from greybox.errors import Error
 from greybox.files import TEXT, read
 from greybox.frames import Array, Frame, Kind, is_readonly, rename
 from greybox.model import Equations
-from greybox.parameters import Parameter, declared
+from greybox.parameters import Parameter, said
 from greybox.signals import Signals, named
 
 __all__ = ["Hold", "Initial", "Record", "filled", "framed", "kind_of", "opened", "records"]
@@ -51,8 +51,14 @@ class Record:
         The inputs between samples: constant, as a digital controller commands them, or straight lines, as measured quantities go.
         Inputs that a mapping leaves out, and all without one, are as a model file says, or constant.
     initial : {"estimated", "first", "steady"} or mapping from str to Parameter
-        The state at the first sample: estimated, computed from the first sample, or declared for each state by
-        :func:`~greybox.free` and :func:`~greybox.fixed`. Without it, as a model file says, or estimated.
+        The state at the first sample: estimated, computed from the first sample, or declared by :func:`~greybox.free` and
+        :func:`~greybox.fixed`; states that a mapping leaves out are as a model file declares them, or estimated from zero on. Without
+        it, as a model file says, or estimated.
+
+    Raises
+    ------
+    Error
+        If both `time` and `sample_time` are given.
     """
 
     data: Any
@@ -63,14 +69,18 @@ class Record:
     hold: Hold | None = None
     initial: Initial | None = None
 
+    def __post_init__(self) -> None:
+        if self.time is not None and self.sample_time is not None:
+            raise Error(f"time={self.time!r} and sample_time={self.sample_time!r} both give the time of the samples; leave one out")
+
     def core(self, equations: Equations, name: str, *, outputs: bool = True) -> _core.Record:
         """Give the record as the library takes it. Without `outputs`, those that the frame lacks are missing measurements."""
         inputs, measured = named(equations.inputs, "inputs"), named(equations.outputs, "outputs")
-        data = opened(self.data)
+        data, name = opened(self.data), self.name or (Path(self.data).name if is_path(self.data) else name)
         if isinstance(data, Path):
             columns_ = {**(self.columns or {}), **({} if self.time is None else {"t": self.time})}
             try:
-                record = _core.Record.from_csv(equations.core, self.name or data.name, data, columns_, self.sample_time)
+                record = _core.Record.from_csv(equations.core, name, data, columns_, self.sample_time)
             except Error as error:
                 raise Error(_in_python(str(error))) from None
             return self._said(equations, record)
@@ -89,7 +99,7 @@ class Record:
             _check_lengths({**{of[signal]: column for signal, column in {**columns, **found}.items()}}, time)
             missing = np.full(len(time), np.nan)
             given = {**columns, **{signal: found.get(signal, missing) for signal in measured}}
-            return self.of(equations, self.name or name, time, {of[signal]: _shared(one) for signal, one in given.items()})
+            return self.of(equations, name, time, {of[signal]: _shared(one) for signal, one in given.items()})
         except Error as error:
             if self.name and self.name not in str(error):
                 raise Error(f"record `{self.name}`: {error}") from None
@@ -103,8 +113,9 @@ class Record:
         return self._said(equations, _core.Record(equations.core, name, time, inputs, outputs))
 
     def _said(self, equations: Equations, record: _core.Record) -> _core.Record:
-        given = self.initial
-        initial = given if given is None or isinstance(given, str) else declared(given, _states(equations), "initial state of")
+        # A mapping of nothing says nothing.
+        given = None if self.initial == {} else self.initial
+        initial = given if given is None or isinstance(given, str) else said(given, _states(equations), "initial state of")
         hold = self.hold if self.hold is None or isinstance(self.hold, str) else dict(self.hold)
         return equations.prepared(record).said(hold, initial)
 
@@ -126,20 +137,25 @@ def _in_python(text: str) -> str:
 
 def opened(data: Any) -> Any:
     """Give the frame in a file, where a path stands in its place; of a text file the path, which the compiled library reads."""
-    if not isinstance(data, (str, os.PathLike)):
+    if not is_path(data):
         return data
     path = Path(data)
     return path if path.suffix.lower() in TEXT else read(path)
 
 
+def is_path(data: Any) -> bool:
+    """Whether the path of a file stands in the place of data."""
+    return isinstance(data, (str, os.PathLike))
+
+
 def framed(data: Any) -> Any:
     """Give data as a frame that is opened once, as a stream has to be; a path stays one."""
-    return data if isinstance(data, (str, os.PathLike)) else Frame(data)
+    return data if is_path(data) else Frame(data)
 
 
 def kind_of(data: Any) -> Kind:
     """Give what makes a frame of the same kind; dicts where the data are a path."""
-    return dict if isinstance(data, (str, os.PathLike)) else Frame(data).kind
+    return dict if is_path(data) else Frame(data).kind
 
 
 def _states(equations: Equations) -> Signals:

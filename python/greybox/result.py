@@ -22,7 +22,7 @@ from greybox.profile import Profile
 from greybox.progress import Progress
 from greybox.records import Record, filled, framed, kind_of
 from greybox.report import Report
-from greybox.signals import named, near
+from greybox.signals import distinct, named, near
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -302,6 +302,7 @@ def _framed(data: Any) -> Any:
 
 def _stacked(records: list[_core.Record], parts: list[dict[str, Array]]) -> dict[str, Any]:
     """Give the columns of all records, one below the other, with the time, and with the record's name where there are several."""
-    labels = {"record": np.repeat([core.name for core in records], [len(core) for core in records])} if len(records) > 1 else {}
+    names = distinct([core.name for core in records])
+    labels = {"record": np.repeat(names, [len(core) for core in records])} if len(records) > 1 else {}
     columns = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
     return {**labels, "t": np.concatenate([core.time() for core in records]), **columns}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, TypeAlias
 
@@ -11,7 +12,7 @@ import numpy as np
 from greybox.errors import Error
 from greybox.symbols import refuse
 
-__all__ = ["Signals", "Values", "Vector", "named", "near", "signals"]
+__all__ = ["Signals", "Values", "Vector", "distinct", "named", "near", "signals"]
 
 #: How quantities may be given: by :func:`signals`, as a mapping from names to units, or as names without units.
 SignalsLike: TypeAlias = "Signals | Mapping[str, str] | Iterable[str]"
@@ -27,6 +28,16 @@ def near(name: str, names: Iterable[str]) -> str:
     said = ", ".join(shown) if shown else "none"
     meant = f"; did you mean `{close[0]}`?" if close else ""
     return said + (", ..." if len(shown) < len(names) else "") + meant
+
+
+def distinct(names: Iterable[str]) -> list[str]:
+    """Number names that occur several times, as the library does: ``run.csv #1``, ``run.csv #2``."""
+    names, seen = list(names), Counter[str]()
+    counts, found = Counter(names), []
+    for name in names:
+        seen[name] += 1
+        found.append(name if counts[name] == 1 else f"{name} #{seen[name]}")
+    return found
 
 
 class Signals(Mapping[str, str]):

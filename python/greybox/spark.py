@@ -64,7 +64,14 @@ def fleet(
     ------
     Error
         If a column is missing, or a parameter is not declared. What is wrong with a record is the reason in its row.
+    TypeError
+        If the frame is none of Spark.
     """
+    if not hasattr(frame, "mapInArrow"):
+        raise TypeError(
+            f"{type(frame).__module__}.{type(frame).__name__} is no frame of Spark; fit it on this machine by gb.fleet, or hand over "
+            "spark.createDataFrame(frame)"
+        )
     from pyspark.sql import functions
 
     made = plan(model, by, parameters, Record(None, None, time, sample_time, columns, hold, initial), given)
@@ -104,9 +111,10 @@ def _worker(made: Plan) -> Callable[[Any], Any]:
 
         # A task of Spark has one core.
         os.environ.setdefault("RAYON_NUM_THREADS", "1")
-        rows = made.rows(table, ordered=True)
-        keys = {name: pa.array(rows[name].tolist(), table.schema.field(name).type) for name in made.by}
-        return pa.table({**rows, **keys})
+        found = pa.table(made.rows(table, ordered=True))
+        # Time stamps reach a worker in the zone of the session, and Spark takes them in UTC alone: the same instants.
+        zoned = {field.name: pa.timestamp(field.type.unit, "UTC") for field in found.schema if getattr(field.type, "tz", None)}
+        return found.cast(pa.schema([(field.name, zoned.get(field.name, field.type)) for field in found.schema]))
 
     return fit
 

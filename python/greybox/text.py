@@ -31,9 +31,9 @@ class TextModel(Equations):
 
     def defaults(self) -> dict[str, Any]:
         """Give the options that the file says."""
-        noise, outputs = self.file.noise, named(self.outputs, "outputs")
-        levels = None if noise is None else dict(zip(outputs, noise, strict=True))
-        return {"noise": levels, "integrator": self.file.integrator, "predictor": self.file.predictor}
+        levels = zip(named(self.outputs, "outputs"), self.file.noise, strict=True)
+        noise = {name: level for name, level in levels if level is not None}
+        return {"noise": noise or None, "integrator": self.file.integrator, "predictor": self.file.predictor}
 
     def prepared(self, record: _core.Record) -> _core.Record:
         """Give a record with the holds and the initial state of the file."""

@@ -5,7 +5,7 @@ use crate::equations::Equations;
 use crate::settings::Parameter;
 use greybox::layout::Quantity;
 use greybox::record::{Channel, Column, Initial, Time};
-use greybox::{DataFile, Hold};
+use greybox::{DataFile, Hold, free};
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
@@ -53,11 +53,11 @@ fn hold_of(name: &str) -> PyResult<Hold> {
     }
 }
 
-/// The initial state: `estimated`, `first` (as the first sample says), or a declaration per state.
+/// The initial state: `estimated`, `first` (as the first sample says), `steady`, or a declaration of each state for which there is one.
 #[derive(FromPyObject)]
 enum Start {
     Named(String),
-    Given(Vec<Parameter>),
+    Given(Vec<Option<Parameter>>),
 }
 
 /// The numbers of an array that Python keeps alive and that nothing can write to.
@@ -97,9 +97,19 @@ fn channels(of: &[Quantity], columns: &[(Bound<'_, PyArray1<f64>>, bool)]) -> Ve
 }
 
 impl Start {
-    fn initial(&self) -> PyResult<Initial> {
+    /// The state at the first sample. A state that is not said stays as it was declared, or is estimated, from zero on: as in the shell.
+    fn initial(&self, before: &Initial) -> PyResult<Initial> {
         match self {
-            Start::Given(given) => Ok(Initial::Given(given.iter().map(|one| one.0).collect())),
+            Start::Given(given) => {
+                let mut all = match before {
+                    Initial::Given(before) => before.clone(),
+                    _ => vec![free(0.0); given.len()],
+                };
+                for (one, said) in all.iter_mut().zip(given) {
+                    *one = said.map_or(*one, |said| said.0);
+                }
+                Ok(Initial::Given(all))
+            }
             Start::Named(name) if name == "estimated" => Ok(Initial::Free),
             Start::Named(name) if name == "first" => Ok(Initial::FirstSample),
             Start::Named(name) if name == "steady" => Ok(Initial::Steady),
@@ -168,7 +178,8 @@ impl Record {
             }
         }
         if let Some(initial) = initial {
-            record = record.initial(initial.initial()?).map_err(raised)?;
+            let initial = initial.initial(record.initial_state())?;
+            record = record.initial(initial).map_err(raised)?;
         }
         Ok(Record { record, equations: self.equations.clone() })
     }

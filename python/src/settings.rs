@@ -113,11 +113,12 @@ impl Parameter {
 #[derive(FromPyObject)]
 #[pyo3(from_item_all)]
 pub struct Options {
-    /// Standard deviation per output, where given.
-    noise: Option<Vec<f64>>,
+    /// Standard deviation of the outputs for which it is given, by their names.
+    noise: Option<Vec<(String, f64)>>,
     /// Whether the covariance of the noise of all outputs is estimated.
     noise_covariance: bool,
-    input_noise: Option<Vec<f64>>,
+    /// The same of the inputs.
+    input_noise: Option<Vec<(String, f64)>>,
     loss: Option<String>,
     weighting: Option<Expression>,
     prefilter: Option<String>,
@@ -141,14 +142,8 @@ impl Options {
     ) -> PyResult<Fit<'a, Equations>> {
         let parameters = parameters.iter().map(|one| one.0).collect();
         let mut fit = Fit::new(equations, records).parameters(parameters);
-        if let Some(sigma) = &self.noise {
-            fit = fit.noise(sigma.clone());
-        }
         if self.noise_covariance {
             fit = fit.noise_covariance();
-        }
-        if let Some(sigma) = &self.input_noise {
-            fit = fit.input_noise(sigma.clone());
         }
         if let Some(Expression { graph, root }) = &self.weighting {
             fit = fit.weighting_by(graph, *root);
@@ -173,6 +168,12 @@ impl Options {
     }
 
     fn named<'a>(&self, mut fit: Fit<'a, Equations>) -> Result<Fit<'a, Equations>, Error> {
+        if let Some(sigma) = &self.noise {
+            fit = fit.noise_by_name(pairs(sigma))?;
+        }
+        if let Some(sigma) = &self.input_noise {
+            fit = fit.input_noise_by_name(pairs(sigma))?;
+        }
         if let Some(name) = &self.loss {
             fit = fit.loss_by_name(name)?;
         }
@@ -190,4 +191,8 @@ impl Options {
         }
         Ok(fit)
     }
+}
+
+fn pairs(all: &[(String, f64)]) -> impl Iterator<Item = (&str, f64)> {
+    all.iter().map(|(name, value)| (name.as_str(), *value))
 }

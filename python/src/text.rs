@@ -53,8 +53,8 @@ impl TextModel {
     }
 
     #[getter]
-    fn noise(&self) -> Option<Vec<f64>> {
-        self.0.noise().into_iter().collect()
+    fn noise(&self) -> Vec<Option<f64>> {
+        self.0.noise()
     }
 
     #[getter]

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+import polars as pl
 import pytest
 from conftest import cooled, cooling
 
@@ -43,6 +44,29 @@ def check(found: pd.DataFrame, expected: pd.DataFrame) -> None:
 
 
 @pytest.fixture(scope="module")
+def zoned(bodies: pd.DataFrame) -> pd.DataFrame:
+    """The same, told apart by hours of a zone, one of which the clock shows twice."""
+    first = pd.Timestamp("2025-10-25T23:30", tz="UTC")
+    return bodies.assign(which=(first + pd.to_timedelta(bodies["which"], unit="h")).dt.tz_convert("Europe/Berlin"))
+
+
+def check_zoned(found: pd.DataFrame, expected: pd.DataFrame) -> None:
+    """Each row has the hour of its record."""
+    found = found.sort_values("which", ignore_index=True)
+    hours = (found["which"] - pd.Timestamp("2025-10-25T23:30", tz="UTC")) / pd.Timedelta(hours=1)
+    assert hours.tolist() == list(range(24)) and np.array_equal(found["k"], expected["k"], equal_nan=True)
+
+
+def test_frames_of_one_machine_are_refused(bodies: pd.DataFrame) -> None:
+    with pytest.raises(TypeError, match="pandas.*DataFrame is no frame of Dask; fit it on this machine by gb.fleet, or .*from_pandas"):
+        gb.dask.fleet(cooling(), bodies, **SAID)
+    with pytest.raises(TypeError, match="pandas.*DataFrame is no frame of Spark; fit it on this machine by gb.fleet, or .*createDataFrame"):
+        gb.spark.fleet(cooling(), bodies, **SAID)
+    with pytest.raises(TypeError, match="polars.*DataFrame is no frame of Dask"):
+        gb.dask.fleet(cooling(), pl.from_pandas(bodies), **SAID)
+
+
+@pytest.fixture(scope="module")
 def spark() -> Iterator[Any]:
     sql = pytest.importorskip("pyspark.sql")
     if shutil.which("java") is None:
@@ -65,6 +89,13 @@ def test_spark(spark: Any, bodies: pd.DataFrame, expected: pd.DataFrame) -> None
         gb.spark.fleet(cooling(), frame, columns={"room": "Room"}, **SAID)
     with pytest.raises(gb.Error, match="no column `t` or `time`"):
         gb.spark.fleet(cooling(), frame.drop("t"), **SAID)
+
+
+def test_zoned_keys_on_spark(spark: Any, zoned: pd.DataFrame, expected: pd.DataFrame) -> None:
+    # Spark knows the instant alone, and hands it over in the zone of the session.
+    spark.conf.set("spark.sql.session.timeZone", "Europe/Berlin")
+    frame = spark.createDataFrame(zoned)
+    check_zoned(gb.spark.fleet(cooling(), frame, batches=3, **SAID).toArrow().to_pandas(), expected)
 
 
 def test_spark_with_an_executor_killed(
@@ -114,6 +145,15 @@ def test_dask(dask_client: Any, bodies: pd.DataFrame, expected: pd.DataFrame) ->
     check(gb.dask.fleet(cooling(), whole, whole=True, **SAID).compute(), expected)
     with pytest.raises(gb.Error, match="there is no column `Room`"):
         gb.dask.fleet(cooling(), frame, columns={"room": "Room"}, **SAID)
+
+
+def test_zoned_keys_on_dask(dask_client: Any, zoned: pd.DataFrame, expected: pd.DataFrame) -> None:
+    import dask.dataframe as dd
+
+    rows = gb.dask.fleet(cooling(), dd.from_pandas(zoned, npartitions=4), **SAID)
+    found = rows.compute()
+    assert rows.dtypes["which"] == found["which"].dtype == zoned["which"].dtype
+    check_zoned(found, expected)
 
 
 def test_dask_with_a_worker_killed(

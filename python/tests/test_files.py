@@ -95,6 +95,19 @@ def test_several_files_and_what_is_said_of_each(tmp_path: Path) -> None:
         gb.fleet(cooling(), paths[0], by="which", k=gb.free(1.0))
 
 
+@pytest.mark.parametrize("kind", ["csv", "parquet"])
+def test_files_of_one_name_in_two_folders_are_two_records(kind: str, tmp_path: Path) -> None:
+    paths = [tmp_path / folder / f"run.{kind}" for folder in ("cold", "warm")]
+    for path, k in zip(paths, (0.3, 0.5), strict=True):
+        path.parent.mkdir()
+        FILES[kind](path, cooled(k=k))
+    found = gb.fit(cooling(), paths, k=gb.free(1.0, per_experiment=True))
+    names = [f"run.{kind} #1", f"run.{kind} #2"]
+    assert [name for name in found.unknowns if name.startswith("k")] == [f"k [{name}]" for name in names]
+    of = pd.DataFrame(found.to_dataframe())["record"]
+    assert of.value_counts(sort=False).to_dict() == dict.fromkeys(names, 200)
+
+
 def test_a_unit_that_is_not_the_signals_is_refused_with_the_factor(tmp_path: Path, declared: dict[str, gb.Parameter]) -> None:
     frame = pd.read_csv(DATA / "pmsm.csv")
     text = frame.to_csv(index=False).splitlines()

@@ -57,10 +57,39 @@ def test_options_reach_the_library(motor: pd.DataFrame, declared: dict[str, gb.P
     assert method(loss="huber:2")["loss"] == "Huber(2.0)"
     assert method(noise={"id": 0.05, "iq": 0.05})["noise"] == "given"
     assert method(noise="covariance")["noise"] == "covariance"
+    # One input has noise, the others none.
+    assert method(input_noise={"w": 0.1})["noise"] == "per_output"
     assert "5" in method(predictor="horizon:5")["predictor"]
     assert "Gauss-Newton" in method(optimizer="gauss-newton")["optimizer"]
     assert "Butterworth" in method(prefilter="low-pass:2,500")["prefilter"]
     assert method(weighting=lambda t, u, y: abs(u.w))["weighting"] != "none"
+
+
+def test_noise_that_is_not_given_is_estimated(motor: pd.DataFrame, declared: dict[str, gb.Parameter]) -> None:
+    def sigmas(**said: Any) -> list[float]:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", gb.FitWarning)
+            found: list[dict[str, Any]] = gb.fit(Pmsm(4), motor, **declared, **said).to_dict()["outputs"]
+        return [one["fit"]["sigma"] for one in found]
+
+    estimated = sigmas()
+    # Both are 0.05 in truth.
+    assert estimated == pytest.approx([0.05, 0.05], rel=0.05)
+    given, other = sigmas(noise={"id": 0.1})
+    assert given == 0.1 and other == pytest.approx(estimated[1], rel=1e-3)
+    assert sigmas(noise={}) == estimated
+
+
+def test_states_that_are_not_said_are_estimated(motor: pd.DataFrame, declared: dict[str, gb.Parameter]) -> None:
+    with warnings.catch_warnings():
+        # The current is not 0.25 A.
+        warnings.simplefilter("ignore", gb.FitWarning)
+        found = gb.fit(Pmsm(4), motor, initial={"iq": gb.fixed(0.25)}, **declared)
+        both = gb.fit(Pmsm(4), motor, initial={"id": gb.free(0.0), "iq": gb.fixed(0.25)}, **declared)
+    assert found.to_dict()["experiments"] == both.to_dict()["experiments"]
+    assert found.to_dict()["experiments"][0]["initial_state"][1] == 0.25
+    assert [name for name in found.unknowns if name not in declared] == ["id(0)"]
+    assert gb.fit(Pmsm(4), motor, initial={}, **declared).unknowns == gb.fit(Pmsm(4), motor, **declared).unknowns
 
 
 def test_weighting_is_an_expression() -> None:
@@ -145,6 +174,7 @@ WRONG: list[tuple[dict[str, Any], str]] = [
     ({"k": gb.free(1.0), "initial": {"bdy": gb.fixed(80.0)}}, "there is no initial state of `bdy`"),
     ({"k": gb.free(1.0), "noise": {"bdy": 0.1}}, "noise names `bdy`"),
     ({"k": gb.free(1.0), "noise": "full"}, "covariance"),
+    ({"k": gb.free(1.0), "time": "t", "sample_time": 0.1}, "time='t' and sample_time=0.1 both give the time of the samples; leave one out"),
     ({"k": gb.free(1.0), "noise": {"body": -1.0}}, "must be positive"),
     ({"k": gb.free(1.0), "starts": 0}, "starts is 0"),
     ({"k": gb.free(1.0), "time_limit": -1.0}, "time limit"),

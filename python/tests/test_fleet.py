@@ -59,6 +59,21 @@ def test_records_of_one_input_each_and_keys_with_gaps() -> None:
     assert len(gb.fleet(cooling(), large, by="serial", k=gb.free(1.0))) == 3
 
 
+def test_zoned_stamps_are_keys_as_they_are() -> None:
+    # A clock that shows 02:30 twice.
+    stamps = pd.to_datetime(["2025-10-26T00:30", "2025-10-26T01:30", "2025-10-26T02:30"], utc=True).tz_convert("Europe/Berlin")
+    frame = bodies(3).assign(which=stamps.repeat(200))
+    frame.loc[200:399, "body"] = np.nan
+    polars = pl.from_pandas(frame)
+    for of in (frame, polars, polars.to_arrow(), frame.set_index(np.arange(600) + 7)):
+        rows = gb.fleet(cooling(), of, by="which", k=gb.free(1.0))
+        keys = rows["which"] if isinstance(rows, pd.DataFrame) else rows["which"].to_pandas()
+        assert pd.DatetimeIndex(list(keys)).equals(stamps)
+        assert "2025-10-26 02:30:00+01:00" in str(list(rows["reason"])[1])
+    assert gb.fleet(cooling(), frame, by="which", k=gb.free(1.0))["which"].dtype == frame["which"].dtype
+    assert gb.fleet(cooling(), polars, by="which", k=gb.free(1.0)).schema["which"] == polars.schema["which"]
+
+
 def test_each_row_is_the_single_fit() -> None:
     frame = bodies(6)
     rows = gb.fleet(cooling(), frame, by="which", k=gb.free(1.0))
@@ -103,6 +118,7 @@ WRONG: list[tuple[dict[str, Any], str]] = [
     ({"by": "which", "k": gb.free(1.0), "columns": "room"}, "give the column of each signal"),
     ({"by": "which", "k": gb.free(1.0), "initial": {"bdy": gb.fixed(0.0)}}, "there is no initial state of `bdy`"),
     ({"by": "which", "k": gb.free(1.0), "noise": 0.1}, "give a standard deviation for each"),
+    ({"by": "which", "k": gb.free(1.0), "sample_time": 0.1, "time": "t"}, "both give the time of the samples; leave one out"),
 ]
 
 

@@ -8,6 +8,7 @@ import pickle
 import subprocess
 import warnings
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 import pytest
@@ -89,6 +90,21 @@ def test_a_file_says_noise_holds_and_initial_states(path: Path, motor: pd.DataFr
         estimated = gb.fit(gb.load(path, np=4), motor, initial="estimated")
     assert found.to_dict()["method"]["noise"] == "given" and found.unknowns == ["rs", "ls", "ke"]
     assert estimated.unknowns == ["rs", "ls", "ke", "id(0)", "iq(0)"]
+
+
+def test_noise_of_some_outputs_in_a_file(path: Path, motor: pd.DataFrame) -> None:
+    path.write_text(PMSM.replace('id = "id"', 'id = { value = "id", unit = "A", noise = 0.1 }').replace("value = 3", "value = 4"))
+
+    def sigmas(**said: Any) -> list[float]:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            return [one["fit"]["sigma"] for one in gb.fit(gb.load(path), motor, **said).to_dict()["outputs"]]
+
+    given, estimated = sigmas()
+    assert given == 0.1 and estimated == pytest.approx(0.05, rel=0.05)
+    # What is said of one output leaves that of the other as the file has it.
+    assert sigmas(noise={"iq": 0.2}) == [0.1, 0.2]
+    assert sigmas(noise={"id": 0.2})[0] == 0.2
 
 
 def test_mistakes_have_their_place(path: Path) -> None:

@@ -102,6 +102,18 @@ fn what_is_said_of_a_file_holds_for_columns() {
     assert_eq!(record.times(), &Time::Uniform { start: 10.0, step: 10.0 });
 }
 
+/// Of another one that is not read, the compression does not matter.
+#[test]
+fn a_column_whose_compression_is_not_read_is_refused() {
+    let file = DataFile::new(file("brotli.parquet"));
+    assert_eq!(file.clone().column("ud", "iq").read_record(&Layout::of::<Pmsm>()).unwrap().inputs()[0].values[3], -4.0);
+    let error = says(
+        file.read_record(&Layout::of::<Pmsm>()),
+        &["brotli.parquet", "column `ud` is compressed by BROTLI", "write the file with zstd, snappy, gzip, lz4"],
+    );
+    assert!(!error.to_string().contains("damaged"), "{error}");
+}
+
 #[test]
 fn mistakes_name_the_column_and_the_remedy() {
     let wrong = "numbers are wanted; convert it where the file is written";

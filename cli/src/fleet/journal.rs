@@ -1,7 +1,7 @@
 //! The journal of a table that is being made: a line for each row, written as soon as the row is known, so that after a kill at any point the
 //! same command goes on from there.
 
-use super::row::{Name, Row};
+use super::row::{BEHIND, Name, Row};
 use crate::Failure;
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{Read, Seek, SeekFrom, Write};
@@ -14,14 +14,14 @@ pub struct Journal {
 }
 
 /// A row as JSON has it. Numbers are texts: JSON has none that is infinite.
-type Line = (String, Option<String>, String, Vec<Option<String>>, String);
+type Line = (String, Option<String>, Vec<Option<String>>, [String; BEHIND]);
 
 /// The row of a line; `None` if it is none.
 fn row(line: &[u8]) -> Option<Row> {
-    let (record, group, verdict, numbers, remarks) = serde_json::from_slice::<Line>(line).ok()?;
+    let (record, group, numbers, [verdict, outcome, warnings, reason]) = serde_json::from_slice::<Line>(line).ok()?;
     let number = |text: Option<String>| text.map(|text| text.parse()).transpose().ok();
     let numbers = numbers.into_iter().map(number).collect::<Option<_>>()?;
-    Some(Row { name: Name { record, group }, verdict, numbers, remarks })
+    Some(Row { name: Name { record, group }, numbers, verdict, outcome, warnings, reason })
 }
 
 impl Journal {
@@ -56,7 +56,7 @@ impl Journal {
         if names == header && by == made_by {
             return Ok((journal, rows));
         }
-        if rows.iter().any(|row| !row.is_error()) {
+        if rows.iter().any(|row| !row.is_failed()) {
             return Err(if names == header { of("another model, or other options") } else { other() }.into());
         }
         journal.file.set_len(0).and_then(|()| journal.file.rewind()).map_err(failed)?;
@@ -67,7 +67,7 @@ impl Journal {
     /// Adds a row.
     pub fn add(&mut self, row: &Row) -> Result<(), Failure> {
         let numbers: Vec<_> = row.numbers.iter().map(|number| number.map(|number| number.to_string())).collect();
-        self.write(&(&row.name.record, &row.name.group, &row.verdict, numbers, &row.remarks))
+        self.write(&(&row.name.record, &row.name.group, numbers, row.behind()))
     }
 
     fn write(&mut self, line: &impl greybox::serde::Serialize) -> Result<(), Failure> {
@@ -94,7 +94,7 @@ mod tests {
         let header = ["record".to_owned()];
         let numbers = vec![Some(0.1), None, Some(f64::NEG_INFINITY), Some(f64::INFINITY)];
         let name = Name { record: "a.csv".to_owned(), group: None };
-        let row = Row { name, verdict: "usable".to_owned(), numbers, remarks: String::new() };
+        let row = Row { numbers, verdict: "usable".to_owned(), ..Row::failed(name, String::new()) };
         Journal::open(&path, &header, "a").unwrap().0.add(&row).unwrap();
         let error = Journal::open(&path, &header, "b").err().unwrap().to_string();
         assert!(error.contains("another model, or other options"), "{error}");

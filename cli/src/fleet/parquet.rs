@@ -1,4 +1,4 @@
-//! The table as Parquet: texts, then numbers that may be missing, then the remarks.
+//! The table as Parquet: texts, then numbers that may be missing, then texts.
 
 use super::row::{Header, Row};
 use crate::Failure;
@@ -15,22 +15,20 @@ use std::sync::Arc;
 
 /// The rows under these columns.
 pub fn write(header: &Header, rows: &[Row]) -> Result<Vec<u8>, Failure> {
-    let (by, texts, last) = (header.by, header.texts(), header.names.len() - 1);
+    let (by, first, behind) = (header.by, header.texts(), header.texts() + header.numbers());
     let column = |at: usize| -> ArrayRef {
-        if at == last {
-            return Arc::new(StringArray::from_iter_values(rows.iter().map(|row| row.texts(by).1)));
+        if at < first {
+            return Arc::new(StringArray::from_iter_values(rows.iter().map(|row| row.before(by)[at])));
         }
-        match at.checked_sub(texts) {
-            None => Arc::new(StringArray::from_iter_values(rows.iter().map(|row| row.texts(by).0[at]))),
-            Some(at) => {
-                let number = |row: &Row| row.numbers.get(at).copied().flatten();
-                Arc::new(rows.iter().map(number).collect::<Float64Array>())
-            }
+        if at >= behind {
+            return Arc::new(StringArray::from_iter_values(rows.iter().map(|row| row.behind()[at - behind])));
         }
+        let number = |row: &Row| row.numbers.get(at - first).copied().flatten();
+        Arc::new(rows.iter().map(number).collect::<Float64Array>())
     };
     // Numbers may be missing in any row, whether or not they are in these.
     let columns = header.names.iter().enumerate().map(|(at, name)| {
-        let number = at >= texts && at < last;
+        let number = (first..behind).contains(&at);
         (name, column(at), number)
     });
     let batch = RecordBatch::try_from_iter_with_nullable(columns)?;
@@ -42,7 +40,7 @@ pub fn write(header: &Header, rows: &[Row]) -> Result<Vec<u8>, Failure> {
 
 /// The rows of a file that [`write()`] wrote.
 pub fn read(path: &Path, header: &Header) -> Result<Vec<Row>, Failure> {
-    let (texts, last) = (header.texts(), header.names.len() - 1);
+    let (first, last) = (header.texts(), header.texts() + header.numbers());
     let reader = ParquetRecordBatchReaderBuilder::try_new(File::open(path)?)?.build()?;
     let mut rows = vec![];
     for batch in reader {
@@ -52,13 +50,15 @@ pub fn read(path: &Path, header: &Header) -> Result<Vec<Row>, Failure> {
             return Err(other.into());
         }
         let text = |at: usize| batch.column(at).as_string_opt::<i32>().ok_or(other);
-        let (before, remarks) = ((0..texts).map(text).collect::<Result<Vec<_>, _>>()?, text(last)?);
+        let before = (0..first).map(text).collect::<Result<Vec<_>, _>>()?;
+        let behind = (last..header.names.len()).map(text).collect::<Result<Vec<_>, _>>()?;
         let number = |at: usize| batch.column(at).as_primitive_opt::<Float64Type>().ok_or(other);
-        let numbers = (texts..last).map(number).collect::<Result<Vec<_>, _>>()?;
+        let numbers = (first..last).map(number).collect::<Result<Vec<_>, _>>()?;
         for at in 0..batch.num_rows() {
-            let texts_of = before.iter().map(|column| column.value(at).to_owned()).collect();
+            let [before, behind] =
+                [&before, &behind].map(|all| all.iter().map(|one| one.value(at).to_owned()).collect());
             let numbers_of = numbers.iter().map(|column| (!column.is_null(at)).then(|| column.value(at))).collect();
-            let row = Row::from_parts(texts_of, header.by, numbers_of, remarks.value(at).to_owned());
+            let row = Row::from_parts(before, header.by, numbers_of, behind);
             rows.push(row.ok_or(other)?);
         }
     }

@@ -15,67 +15,88 @@ pub struct Name {
     pub group: Option<String>,
 }
 
+/// How many columns have texts behind the numbers.
+pub const BEHIND: usize = 4;
+
 /// What is known of one record.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Row {
     pub name: Name,
-    /// `usable`, `with care`, `not usable`, or `error`.
-    pub verdict: String,
-    /// Value, standard error and interval of each parameter; none where there is none.
+    /// Samples; value, standard error and interval of each parameter; root mean squared error of each output. None where there is none.
     pub numbers: Vec<Option<f64>>,
-    /// Codes of warnings, or the error.
-    pub remarks: String,
+    /// `usable`, `usable with care`, `not usable`, or `failed`.
+    pub verdict: String,
+    /// How the search ended, as in the JSON of an estimate.
+    pub outcome: String,
+    /// Codes of warnings, as in the JSON of an estimate.
+    pub warnings: String,
+    /// Why the record could not be read or fitted.
+    pub reason: String,
 }
 
 impl Row {
-    /// The row of an answer.
-    pub fn of(name: Name, answer: Result<&Summary, String>) -> Self {
+    /// The row of an answer about a record of so many samples.
+    pub fn of(name: Name, samples: usize, answer: Result<&Summary, String>) -> Self {
+        let samples = Some(samples as f64);
         let found = match answer {
             Ok(found) => found,
-            Err(error) => return Row::failed(name, error),
+            Err(error) => return Row { numbers: vec![samples], ..Row::failed(name, error) },
         };
         let verdict = match found.severity() {
             Severity::Usable => "usable",
-            Severity::UsableWithCare => "with care",
+            Severity::UsableWithCare => "usable with care",
             Severity::NotUsable => "not usable",
         };
-        let codes: Vec<String> = found.warnings.iter().map(|one| format!("{:?}", one.code)).collect();
-        let numbers = found.parameters.iter().flat_map(numbers).collect();
-        Row { name, verdict: verdict.to_owned(), numbers, remarks: codes.join(" ") }
+        let mut codes: Vec<String> = vec![];
+        for warning in found.warnings.iter().filter(|one| one.severity != Severity::Usable) {
+            let code = code(warning.code);
+            if !codes.contains(&code) {
+                codes.push(code);
+            }
+        }
+        let errors = found.outputs.iter().map(|one| Some(one.fit.rmse).filter(|rmse| !rmse.is_nan()));
+        let numbers = [samples].into_iter().chain(found.parameters.iter().flat_map(numbers)).chain(errors).collect();
+        let (outcome, reason) = (code(found.outcome), String::new());
+        Row { name, numbers, verdict: verdict.to_owned(), outcome, warnings: codes.join(" "), reason }
     }
 
-    /// The row of a record that cannot be fitted.
+    /// The row of a record that cannot be read or fitted.
     pub fn failed(name: Name, error: String) -> Self {
-        Row { name, verdict: "error".to_owned(), numbers: vec![], remarks: in_shell(&error) }
+        let (outcome, warnings) = (String::new(), String::new());
+        Row { name, numbers: vec![], verdict: "failed".to_owned(), outcome, warnings, reason: in_shell(&error) }
     }
 
     /// Whether the record could not be read or fitted.
-    pub fn is_error(&self) -> bool {
-        self.verdict == "error"
+    pub fn is_failed(&self) -> bool {
+        self.verdict == "failed"
     }
 
     pub fn verdict(&self) -> Verdict {
         match self.verdict.as_str() {
-            "with care" => Verdict::WithCare,
-            "not usable" | "error" => Verdict::NotUsable,
+            "usable with care" => Verdict::WithCare,
+            "not usable" | "failed" => Verdict::NotUsable,
             _ => Verdict::Usable,
         }
     }
 
-    /// The texts before and behind the numbers, as the header has them.
-    pub fn texts(&self, by: bool) -> (Vec<&str>, &str) {
+    /// The texts before the numbers, as the header has them.
+    pub fn before(&self, by: bool) -> Vec<&str> {
         let group = by.then(|| self.name.group.as_deref().unwrap_or_default());
-        ([self.name.record.as_str()].into_iter().chain(group).chain([self.verdict.as_str()]).collect(), &self.remarks)
+        [self.name.record.as_str()].into_iter().chain(group).collect()
     }
 
-    /// The row of texts before, numbers and the text behind.
-    pub fn from_parts(texts: Vec<String>, by: bool, numbers: Vec<Option<f64>>, remarks: String) -> Option<Self> {
-        let mut texts = texts.into_iter();
-        let record = texts.next()?;
-        let group = if by { texts.next().filter(|group| !group.is_empty()) } else { None };
-        // An error has no number at all.
-        let numbers = if numbers.iter().all(Option::is_none) { vec![] } else { numbers };
-        Some(Row { name: Name { record, group }, verdict: texts.next()?, numbers, remarks })
+    /// The texts behind the numbers, as the header has them.
+    pub fn behind(&self) -> [&str; BEHIND] {
+        [&self.verdict, &self.outcome, &self.warnings, &self.reason].map(String::as_str)
+    }
+
+    /// The row of texts before, numbers and texts behind.
+    pub fn from_parts(before: Vec<String>, by: bool, numbers: Vec<Option<f64>>, behind: Vec<String>) -> Option<Self> {
+        let mut before = before.into_iter();
+        let record = before.next()?;
+        let group = if by { before.next().filter(|group| !group.is_empty()) } else { None };
+        let [verdict, outcome, warnings, reason] = behind.try_into().ok()?;
+        Some(Row { name: Name { record, group }, numbers, verdict, outcome, warnings, reason })
     }
 }
 
@@ -93,13 +114,17 @@ impl Header {
     /// # Errors
     /// A name that stands twice.
     pub fn new(layout: &Layout, by: Option<&str>) -> Result<Self, Failure> {
-        let columns = layout.parameters.iter().map(|one| one.name.as_str());
-        let columns = columns.flat_map(|name| ["", "_std", "_lower", "_upper"].map(|end| format!("{name}{end}")));
-        let first = ["record"].into_iter().chain(by).chain(["verdict"]).map(str::to_owned);
-        let names: Vec<String> = first.chain(columns).chain(["remarks".to_owned()]).collect();
+        let parameters = layout.parameters.iter().map(|one| one.name.as_str());
+        let parameters =
+            parameters.flat_map(|name| ["", "_error", "_lower", "_upper"].map(|end| format!("{name}{end}")));
+        let outputs = layout.outputs.iter().map(|one| format!("{}_rmse", one.name));
+        let before = ["record"].into_iter().chain(by).chain(["samples"]).map(str::to_owned);
+        let behind: [&str; BEHIND] = ["verdict", "outcome", "warnings", "reason"];
+        let names: Vec<String> = before.chain(parameters).chain(outputs).chain(behind.map(str::to_owned)).collect();
         match names.iter().enumerate().find(|(at, name)| names[..*at].contains(name)) {
             Some((_, name)) => {
-                Err(format!("the table would have two columns `{name}`; rename that of the records").into())
+                Err(format!("the table would have two columns `{name}`; rename that of the records, or the parameter")
+                    .into())
             }
             None => Ok(Header { names, by: by.is_some() }),
         }
@@ -107,20 +132,28 @@ impl Header {
 
     /// How many columns have texts before the numbers.
     pub fn texts(&self) -> usize {
-        if self.by { 3 } else { 2 }
+        if self.by { 2 } else { 1 }
     }
 
     /// How many columns have numbers.
     pub fn numbers(&self) -> usize {
-        self.names.len() - self.texts() - 1
+        self.names.len() - self.texts() - BEHIND
     }
 }
 
 /// Value, standard error and interval of a parameter.
 fn numbers(one: &greybox::estimate::ParameterEstimate) -> [Option<f64>; 4] {
-    let (error, lower, upper) = match one.knowledge {
-        Knowledge::Known { standard_error, lower, upper } => (Some(standard_error), Some(lower), Some(upper)),
-        _ => (None, None, None),
+    let interval = match one.knowledge {
+        Knowledge::Known { lower, upper, .. } => Some((lower, upper)),
+        Knowledge::Held { bound, end: Some(end) } => Some((bound.min(end), bound.max(end))),
+        _ => None,
     };
-    [Some(one.value), error, lower, upper]
+    let (lower, upper) = interval.unzip();
+    [Some(one.value), one.knowledge.standard_error(), lower, upper]
+}
+
+/// The name that a variant has in JSON.
+fn code(variant: impl greybox::serde::Serialize) -> String {
+    let json = serde_json::to_value(variant).unwrap_or_default();
+    json.get("code").unwrap_or(&json).as_str().unwrap_or_default().to_owned()
 }

@@ -57,7 +57,7 @@ impl Table {
         let (journal, unfinished) = Journal::open(&beside(path, ".journal"), &table.header.names, &table.made_by)?;
         table.journal = Some(journal);
         // A run that was killed between writing the table and removing its journal has the rows twice; an error may have become an answer.
-        let (failed, rows): (Vec<Row>, Vec<Row>) = written.into_iter().chain(unfinished).partition(Row::is_error);
+        let (failed, rows): (Vec<Row>, Vec<Row>) = written.into_iter().chain(unfinished).partition(Row::is_failed);
         let mut there = HashSet::new();
         table.rows = rows.into_iter().filter(|row| there.insert(row.name.clone())).collect();
         table.failed = failed.into_iter().filter(|row| there.insert(row.name.clone())).collect();
@@ -71,7 +71,7 @@ impl Table {
         if made_by.as_ref().is_ok_and(|made_by| *made_by == self.made_by) {
             return Ok(written);
         }
-        if written.iter().all(Row::is_error) {
+        if written.iter().all(Row::is_failed) {
             return Ok(vec![]);
         }
         let why = match made_by {
@@ -89,9 +89,9 @@ impl Table {
 
     /// Adds a row, and says why a record has no estimate.
     pub fn add(&mut self, row: Row, terminal: &Terminal) -> Result<(), Failure> {
-        if row.is_error() {
+        if row.is_failed() {
             let group = row.name.group.as_ref().map_or(String::new(), |group| format!(", {group}"));
-            terminal.remark(format_args!("{}{group}: {}", row.name.record, row.remarks));
+            terminal.remark(format_args!("{}{group}: {}", row.name.record, row.reason));
         }
         if let Some(journal) = &mut self.journal {
             journal.add(&row)?;
@@ -115,7 +115,8 @@ impl Table {
     pub fn counts(&self, before: usize) -> String {
         let new = &self.rows[before..];
         let count = |verdict: &str| new.iter().filter(|row| row.verdict == verdict).count();
-        let verdicts = ["usable", "with care", "not usable", "error"].map(|one| format!("{} {one}", count(one)));
+        let verdicts =
+            ["usable", "usable with care", "not usable", "failed"].map(|one| format!("{} {one}", count(one)));
         format!("{} records: {}", new.len(), verdicts.join(", "))
     }
 
@@ -144,10 +145,10 @@ impl Table {
         let mut writer = csv::Writer::from_writer(vec![]);
         writer.write_record(&self.header.names)?;
         for row in &self.rows {
-            let (before, remarks) = row.texts(self.header.by);
             let number = |at: usize| row.numbers.get(at).copied().flatten().map_or(String::new(), |x| x.to_string());
-            let cells = before.into_iter().map(str::to_owned).chain((0..self.header.numbers()).map(number));
-            writer.write_record(cells.chain([remarks.to_owned()]))?;
+            let before = row.before(self.header.by).into_iter().map(str::to_owned);
+            let behind = row.behind().map(str::to_owned);
+            writer.write_record(before.chain((0..self.header.numbers()).map(number)).chain(behind))?;
         }
         Ok(writer.into_inner().map_err(|error| error.to_string())?)
     }
@@ -159,10 +160,10 @@ impl Table {
         }
         let row = |record: csv::StringRecord| {
             let mut cells: Vec<String> = record.iter().map(str::to_owned).collect();
-            let remarks = cells.pop()?;
-            let numbers = cells.split_off(self.header.texts());
+            let mut numbers = cells.split_off(self.header.texts());
+            let behind = numbers.split_off(self.header.numbers());
             let number = |cell: &String| if cell.is_empty() { Some(None) } else { cell.parse().ok().map(Some) };
-            Row::from_parts(cells, self.header.by, numbers.iter().map(number).collect::<Option<_>>()?, remarks)
+            Row::from_parts(cells, self.header.by, numbers.iter().map(number).collect::<Option<_>>()?, behind)
         };
         let damaged = |at: usize| format!("row {} is damaged; name another table", at + 1);
         file.records().enumerate().map(|(at, record)| Ok(row(record?).ok_or_else(|| damaged(at))?)).collect()

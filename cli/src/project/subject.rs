@@ -3,7 +3,7 @@
 use clap::{Arg, ArgAction};
 
 /// Options of which one has no effect, or no meaning, beside the other.
-const CONTRARY: [(&str, &str); 9] = [
+const CONTRARY: [(&str, &str); 13] = [
     ("fix", "free"),
     ("fix", "set"),
     ("fix", "bounds"),
@@ -13,6 +13,10 @@ const CONTRARY: [(&str, &str); 9] = [
     ("noise", "noise-covariance"),
     ("staged", "multiple-shooting"),
     ("column", "sample-time"),
+    ("unit", "sample-time"),
+    ("time-unit", "sample-time"),
+    ("date-order", "sample-time"),
+    ("zone", "sample-time"),
 ];
 
 /// Lists that are said as a whole; of others each name is said by itself.
@@ -78,6 +82,10 @@ mod tests {
             (("staged", "true"), ("multiple-shooting", "true")),
             (("time", "Time"), ("sample-time", "1e-3")),
             (("column", "t=Time"), ("sample-time", "1e-3")),
+            (("time-unit", "ms"), ("sample-time", "1e-3")),
+            (("unit", "t=0.001"), ("sample-time", "1e-3")),
+            (("zone", "Europe/Berlin"), ("sample-time", "1e-3")),
+            (("date-order", "day"), ("sample-time", "1e-3")),
             (("time", "Time"), ("column", "t=Zeit")),
             (("loss", "huber"), ("loss", "cauchy")),
             (("of", "rs"), ("of", "ls")),
@@ -90,6 +98,7 @@ mod tests {
             (("noise", "id=1"), ("noise", "iq=1")),
             (("initial", "id=0"), ("initial", "iq=0")),
             (("column", "w=speed"), ("sample-time", "1e-3")),
+            (("unit", "w=rpm"), ("sample-time", "1e-3")),
             (("loss", "huber"), ("starts", "20")),
         ] {
             assert!(!meet(one, other), "{one:?} {other:?}");

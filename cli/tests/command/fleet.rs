@@ -17,13 +17,26 @@ fn a_fleet_is_a_table_that_goes_on_where_it_was() {
     let table = std::fs::read_to_string(bench.path("motors.csv")).unwrap();
     let rows: Vec<&str> = table.lines().collect();
     assert_eq!(rows.len(), 4, "{table}");
-    assert!(rows[0].starts_with("record,verdict,rs,rs_std,rs_lower,rs_upper,ls,"), "{table}");
-    assert!(rows[1].starts_with("a.csv,usable,0.63") && rows[2].starts_with("b.csv,error,"), "{table}");
+    // The columns of a fleet in Python, and its words.
+    let parameters = ["rs", "ls", "ke"].map(|name| format!("{name},{name}_error,{name}_lower,{name}_upper")).join(",");
+    let header = format!("record,samples,{parameters},id_rmse,iq_rmse,verdict,outcome,warnings,reason");
+    assert_eq!(rows[0], header);
+    let cells: Vec<&str> = rows[1].split(',').collect();
+    let number = |at: usize| cells[at].parse::<f64>().unwrap();
+    assert_eq!((cells[0], cells[1], &cells[16..]), ("a.csv", "2000", &["usable", "converged", "", ""][..]));
+    // Standard errors and noise as in the README.
+    assert!((number(2) - 0.63).abs() < 1e-3 && (number(3) - 2e-4).abs() < 1e-4, "{table}");
+    assert!(number(4) < number(2) && number(2) < number(5), "{table}");
+    assert!((number(14) / 0.05 - 1.0).abs() < 0.1 && (number(15) / 0.05 - 1.0).abs() < 0.1, "{table}");
+    assert!(
+        rows[2].starts_with(&format!("b.csv,{}failed,,,", ",".repeat(15))) && rows[2].contains("line 2"),
+        "{table}"
+    );
     // A row that is there is kept as it stands.
-    std::fs::write(bench.path("motors.csv"), table.replace("a.csv,usable", "a.csv,kept")).unwrap();
+    std::fs::write(bench.path("motors.csv"), table.replacen(",usable,", ",kept,", 1)).unwrap();
     bench.ends(3, &["fleet", "pmsm.toml", "[abc].csv", "--out", "motors.csv"]);
     let again = std::fs::read_to_string(bench.path("motors.csv")).unwrap();
-    assert!(again.contains("a.csv,kept") && again.lines().count() == 4, "{again}");
+    assert!(again.contains(",kept,") && again.lines().count() == 4, "{again}");
 }
 
 /// Parts of the shipped record as so many motors in one file, their rows mixed.
@@ -49,11 +62,16 @@ fn a_column_tells_the_records_of_a_file_apart() {
     let words = ["fleet", "pmsm.toml", "motors.csv", "--by", "motor", "--out", "t.csv"];
     let (_, error) = bench.ends(3, &words);
     assert!(error.contains("motors.csv, m1: ") && error.contains("line 3"), "{error}");
-    assert!(error.lines().last().unwrap().starts_with("3 records: ") && error.contains("1 error"), "{error}");
+    assert!(error.lines().last().unwrap().starts_with("3 records: ") && error.contains("1 failed"), "{error}");
     let table = std::fs::read_to_string(bench.path("t.csv")).unwrap();
     let rows: Vec<&str> = table.lines().collect();
-    assert!(rows.len() == 4 && rows[0].starts_with("record,motor,verdict,rs,rs_std"), "{table}");
-    assert!(rows[1].starts_with("motors.csv,m0,") && rows[2].starts_with("motors.csv,m1,error,,"), "{table}");
+    assert!(rows.len() == 4 && rows[0].starts_with("record,motor,samples,rs,rs_error"), "{table}");
+    assert!(
+        rows[1].starts_with("motors.csv,m0,")
+            && rows[2].starts_with("motors.csv,m1,,")
+            && rows[2].contains(",failed,,,"),
+        "{table}"
+    );
     assert_eq!(bench.names(), ["motors.csv", "pmsm.toml", "record.csv", "t.csv", "t.csv.run"], "no journal is left");
     // Each by itself is the same as in a file of its own, to the bit.
     let alone: Vec<&str> = text.lines().filter(|line| line.starts_with("m2,") || line.starts_with("motor,")).collect();
@@ -122,7 +140,7 @@ fn rows_without_a_name_are_in_the_table_once() {
     for out in outs {
         let words = ["fleet", "pmsm.toml", "motors.csv", "--by", "motor", "--out", out];
         let (_, error) = bench.ends(3, &words);
-        assert!(error.contains("1 records: ") && error.contains("1 error"), "{error}");
+        assert!(error.contains("1 records: ") && error.contains("1 failed"), "{error}");
         // As of any error, it is tried again.
         let (_, error) = bench.ends(3, &words);
         assert!(error.contains("1 records: ") && !error.contains("in the table already"), "{error}");
@@ -169,18 +187,22 @@ fn records_that_failed_are_tried_again() {
     // A mistake that no record survives is no run that holds on to its options.
     let (_, error) =
         bench.ends(3, &["fleet", "pmsm.toml", "record.csv", "b.csv", "--column", "w=speed", "--out", "t.csv"]);
-    assert!(error.contains("2 error"), "{error}");
+    assert!(error.contains("2 failed"), "{error}");
     std::fs::write(bench.path("b.csv"), "t,ud,uq,w,id,iq\n0,1,2\n").unwrap();
     let (_, error) = bench.ends(3, &["fleet", "pmsm.toml", "record.csv", "b.csv", "--out", "t.csv"]);
-    assert!(error.contains("1 usable") && error.contains("1 error"), "{error}");
+    assert!(error.contains("1 usable") && error.contains("1 failed"), "{error}");
     assert_eq!(table().lines().count(), 3, "{}", table());
     // A file that is not named keeps its row.
     bench.ends(3, &["fleet", "pmsm.toml", "record.csv", "--out", "t.csv"]);
-    assert!(table().contains("\nb.csv,error,"), "{}", table());
+    assert!(table().contains("\nb.csv,,") && table().contains(",failed,"), "{}", table());
     std::fs::copy(record(), bench.path("b.csv")).unwrap();
     let (_, error) = bench.ends(0, &["fleet", "pmsm.toml", "record.csv", "b.csv", "--out", "t.csv"]);
     assert!(error.contains("1 records are in the table already") && error.contains("1 records: 1 usable"), "{error}");
-    assert!(table().lines().count() == 3 && table().contains("\nb.csv,usable,"), "{}", table());
+    assert!(
+        table().lines().count() == 3 && table().contains("\nb.csv,2000,") && !table().contains(",failed,"),
+        "{}",
+        table()
+    );
 }
 
 #[test]

@@ -387,10 +387,25 @@ fn options_without_a_meaning_are_refused() {
         assert!(error.contains("it has no meaning here; it is an option of fit, compare, "), "{error}");
     }
     assert!(simulate("--noise", "id=-1").contains("-1 is no standard deviation; give a positive number, or 0"));
-    let (_, error) = bench.ends(1, &["check", "pmsm.toml", "record.csv", "--sample-time", "5e-4", "--time", "t"]);
-    assert!(error.contains("--sample-time <SECONDS>") && error.contains("--time <COLUMN>"), "{error}");
-    let (_, error) = bench.ends(1, &["check", "pmsm.toml", "record.csv", "--sample-time", "5e-4", "--column", "t=t"]);
-    assert!(error.contains("--sample-time 0.0005: --column t=t gives the time, too"), "{error}");
+    let timed = |option: &str, value: &str| {
+        let words = ["check", "pmsm.toml", "record.csv", "--sample-time", "5e-4", option, value];
+        bench.ends(1, &words).1
+    };
+    for (option, value) in [
+        ("--time <COLUMN>", "t"),
+        ("--time-unit <UNIT>", "ms"),
+        ("--date-order <FIRST>", "day"),
+        ("--zone <ZONE>", "Europe/Berlin"),
+    ] {
+        let error = timed(option.split(' ').next().unwrap(), value);
+        let says = format!("'--sample-time <SECONDS>' cannot be used with '{option}'");
+        assert!(error.contains(&says), "{error}");
+    }
+    for (option, value) in [("--column", "t=t"), ("--unit", "t=1e-3")] {
+        let error = timed(option, value);
+        let says = format!("--sample-time 0.0005 and {option} {value}: the time is from one of them");
+        assert!(error.contains(&says), "{error}");
+    }
 }
 
 /// A bootstrap has intervals only when all refits are done.

@@ -39,7 +39,7 @@ fn what_excludes_an_entry_of_the_project_takes_its_place() {
     let bench = project("noise-covariance = true\ninitial = 'steady'\nstaged = true\nsample-time = 1.0");
     let words = ["fit", "--noise", "id=0.05", "--initial", "id=0", "--multiple-shooting", "--time", "t"];
     assert_eq!(answers(&bench, &words).lines().next(), answers(&project(""), &words).lines().next());
-    let bench = project("noise = { id = 0.05 }\ninitial = { id = 0 }\ntime = 'Time'");
+    let bench = project("noise = { id = 0.05 }\ninitial = { id = 0 }\ntime = 'Time'\ntime-unit = 'ms'\nzone = 'UTC'");
     answers(&bench, &["fit", "--noise-covariance", "--initial", "first", "--sample-time", "5e-4"]);
 }
 
@@ -86,6 +86,7 @@ fn entries_say_what_they_take() {
         ("loss = 2020-01-01", "`loss`: a datetime does not belong here"),
         ("starts = 'many'", "invalid value 'many' for '--starts <COUNT>'"),
         ("staged = true\nmultiple-shooting = true", "cannot be used with"),
+        ("sample-time = 5e-4\ntime-unit = 'ms'", "'--sample-time <SECONDS>' cannot be used with '--time-unit <UNIT>'"),
     ] {
         let (_, error) = project(entry).ends(1, &["fit", "--loss", "huber"]);
         assert!(error.starts_with("error: greybox.toml: ") && error.contains(says), "{entry}\n{error}");

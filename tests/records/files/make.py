@@ -41,6 +41,7 @@ def frames():
     frame.to_parquet(path("pandas.parquet"))
     frame.set_index("time").astype({"ud": "float32", "iq": "int8"}).to_parquet(path("pandas_index.parquet"), compression="gzip")
     frame.assign(ud=frame.ud.astype(str)).to_parquet(path("text.parquet"))
+    frame.to_parquet(path("brotli.parquet"), compression={"ud": "brotli", "remark": "brotli"})
     frame.drop(columns="ud").to_parquet(path("missing.parquet"))
     frame.iloc[:0].to_parquet(path("no_rows.parquet"))
     frame.iloc[[0, 2, 1, 3]].to_parquet(path("backwards.parquet"))

@@ -10,6 +10,7 @@ use arrow_ipc::reader::{FileReader, StreamReader};
 use arrow_schema::{ArrowError, SchemaRef};
 use parquet::arrow::ProjectionMask;
 use parquet::arrow::arrow_reader::{ArrowReaderMetadata, ParquetRecordBatchReaderBuilder};
+use parquet::basic::CompressionCodec;
 use std::fs::File;
 use std::io::{BufReader, Read, Seek};
 
@@ -62,6 +63,7 @@ impl<'a> ArrowFile<'a> {
         Ok(match &self.kind {
             Kind::Parquet(metadata) => {
                 let mask = ProjectionMask::roots(metadata.parquet_schema(), columns);
+                self.check_compression(metadata, &mask)?;
                 let reader =
                     ParquetRecordBatchReaderBuilder::new_with_metadata(bytes.into_inner(), (**metadata).clone());
                 Box::new(reader.with_projection(mask).with_batch_size(ROWS).build().map_err(|e| damaged(e.into()))?)
@@ -69,6 +71,23 @@ impl<'a> ArrowFile<'a> {
             Kind::File => Box::new(FileReader::try_new(bytes, Some(columns)).map_err(|e| damaged(e.into()))?),
             Kind::Stream => Box::new(StreamReader::try_new(bytes, Some(columns)).map_err(|e| damaged(e.into()))?),
         })
+    }
+}
+
+impl ArrowFile<'_> {
+    /// Refuses columns whose compression this library is built without.
+    fn check_compression(&self, metadata: &ArrowReaderMetadata, mask: &ProjectionMask) -> Result<(), Error> {
+        let groups = metadata.metadata().row_groups().iter();
+        let mut chunks = groups.flat_map(|group| group.columns().iter().enumerate());
+        let is_unread = |codec| matches!(codec, CompressionCodec::BROTLI | CompressionCodec::LZO);
+        match chunks.find(|(leaf, chunk)| mask.leaf_included(*leaf) && is_unread(chunk.compression_codec())) {
+            None => Ok(()),
+            Some((_, chunk)) => Err(self.file.cannot(format!(
+                "column `{}` is compressed by {:?}, which is not read; write the file with zstd, snappy, gzip, lz4 or no compression",
+                chunk.column_path().parts().first().map_or("", String::as_str),
+                chunk.compression_codec()
+            ))),
+        }
     }
 }
 
