@@ -165,12 +165,21 @@ impl Report {
     /// # Errors
     /// Another ending, or a path that cannot be written to; nothing is left behind.
     pub fn save(&self, path: impl AsRef<Path>) -> Result<(), Error> {
+        self.save_in_words(path, str::to_owned)
+    }
+
+    /// [`save`](Report::save) with the text passed through `words`, by which a front end names its own options
+    /// (`text::renamed`). JSON stays as it is.
+    ///
+    /// # Errors
+    /// As [`save`](Report::save).
+    pub fn save_in_words(&self, path: impl AsRef<Path>, words: impl Fn(&str) -> String) -> Result<(), Error> {
         let path = path.as_ref();
         let text = match path.extension().and_then(|ending| ending.to_str()) {
-            Some("html") => self.to_html(),
-            Some("md") => self.to_markdown(),
+            Some("html") => words(&self.to_html()),
+            Some("md") => words(&self.to_markdown()),
             Some("json") => self.to_json()?,
-            Some("txt") => self.to_string(),
+            Some("txt") => words(&self.to_string()),
             _ => {
                 let path = path.display();
                 return Err(Error::Option(format!(

@@ -39,10 +39,10 @@ pub fn target(path: &Path) -> PathBuf {
 /// Writes a report as the path's ending says, one of [`REPORTS`].
 pub fn report(path: &Path, report: &Report) -> Result<(), Failure> {
     let text = match ending(path).as_str() {
-        "html" => report.to_html(),
-        "md" => report.to_markdown(),
+        "html" => in_shell(&report.to_html()),
+        "md" => in_shell(&report.to_markdown()),
         "json" => report.to_json()?,
-        _ => report.to_string(),
+        _ => in_shell(&report.to_string()),
     };
     write(Some(path), text.as_bytes())
 }

@@ -50,7 +50,7 @@ impl Report {
     /// Severity and text of each reason why the estimate is not simply usable.
     #[getter]
     fn reasons(&self) -> Vec<(String, String)> {
-        self.0.reasons().into_iter().map(|(severity, text)| (name_of(severity), text.to_owned())).collect()
+        self.0.reasons().into_iter().map(|(severity, text)| (name_of(severity), in_python(text))).collect()
     }
 
     /// Title and picture (SVG) of each plot.
@@ -59,11 +59,11 @@ impl Report {
     }
 
     fn to_html(&self) -> String {
-        self.0.to_html()
+        in_python(&self.0.to_html())
     }
 
     fn to_markdown(&self) -> String {
-        self.0.to_markdown()
+        in_python(&self.0.to_markdown())
     }
 
     fn to_json(&self) -> PyResult<String> {
@@ -76,6 +76,6 @@ impl Report {
 
     /// Writes the report, whole or not at all, as the path ends in `.html`, `.md`, `.json` or `.txt`.
     fn save(&self, path: PathBuf) -> PyResult<()> {
-        self.0.save(path).map_err(raised)
+        self.0.save_in_words(path, in_python).map_err(raised)
     }
 }
