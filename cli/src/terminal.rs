@@ -19,28 +19,25 @@ pub struct Terminal {
     quiet: bool,
     /// Raised by the first Ctrl-C.
     stop: Arc<AtomicBool>,
-    /// Whether what is done so far is lost when it is ended.
-    whole: Arc<AtomicBool>,
 }
 
 impl Terminal {
     pub fn new(quiet: bool) -> Self {
-        let [stop, whole] = [(); 2].map(|()| Arc::new(AtomicBool::new(false)));
-        let (raised, lost) = (stop.clone(), whole.clone());
+        let stop = Arc::new(AtomicBool::new(false));
+        let raised = stop.clone();
         // Where a handler cannot be set, Ctrl-C ends the program as it always does.
         let _ = ctrlc::set_handler(move || {
             if raised.swap(true, Ordering::Relaxed) {
                 std::process::exit(130);
             }
-            let what = if lost.load(Ordering::Relaxed) { "without a result" } else { "with the best so far" };
-            note(format_args!("\nending {what}; once more to end at once"));
+            note("\nending with the best so far; once more to end at once");
         });
-        Terminal { quiet, stop, whole }
+        Terminal { quiet, stop }
     }
 
     /// The same without remarks and progress.
     pub fn silent(&self) -> Self {
-        Terminal { quiet: true, stop: self.stop.clone(), whole: self.whole.clone() }
+        Terminal { quiet: true, stop: self.stop.clone() }
     }
 
     /// Whether standard output is to be in color: a terminal, unless NO_COLOR is set (no-color.org).
@@ -53,11 +50,6 @@ impl Terminal {
         if !self.quiet {
             note(text);
         }
-    }
-
-    /// Says that what follows has a result only as a whole.
-    pub fn whole_only(&self) {
-        self.whole.store(true, Ordering::Relaxed);
     }
 
     /// The flag that ends a search.

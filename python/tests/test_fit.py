@@ -118,7 +118,7 @@ def test_several_records_and_their_own_parameters() -> None:
     # Of a frame nobody knows which of the two it is; a record of the name of one has its parameter.
     named = found.residuals(warm)["body"]
     assert float(np.std(np.asarray(named))) == pytest.approx(0.05, rel=0.1)
-    with pytest.raises(gb.Error, match="a value for each record of the fit, and this is none of them \\(cold, warm\\)"):
+    with pytest.raises(gb.Error, match="a value for each record of the fit, and this is none of them \\(cold, warm;"):
         found.predict(cooled(k=0.5, seed=2))
     with pytest.raises(gb.Error, match="say which by record="):
         found.derived("tau", lambda p: 1 / p.k)

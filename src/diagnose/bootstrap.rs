@@ -32,7 +32,7 @@ pub struct Bootstrap {
     pub unknowns: Vec<String>,
     /// Refits that ended; the others are left out.
     pub converged: u64,
-    /// Refits begun.
+    /// Refits tried: fewer than were asked for where a time limit or a flag ended them.
     pub tried: u64,
     /// Standard deviation of each unknown over the refits.
     #[serde(with = "crate::real")]
@@ -49,11 +49,14 @@ pub struct Bootstrap {
     pub seed: u64,
 }
 
+/// The fewest refits that have percentiles.
+const LEAST: usize = 20;
+
 /// Refits `count` records made of the prediction and resampled residuals, from the estimate on.
 ///
 /// # Errors
 /// An estimate of another problem or one that cannot be simulated, blocks longer than half of an experiment, fewer than twenty
-/// refits that end; a time limit or a flag that stops it.
+/// refits that end. A time limit or a flag ends it with the refits so far, or is an error where they are fewer.
 ///
 /// ```
 /// # use greybox::{Experiment, Fit, free, pmsm::{Surface, Winding}};
@@ -94,9 +97,6 @@ pub fn bootstrap(
     }
     check_blocks(problem, &residuals, resampling)?;
     let refit = |number: usize| -> Option<Vec<f64>> {
-        if control.stops() {
-            return None;
-        }
         let mut random = Random::stream(seed, number as u64);
         let parts = problem.records().iter().zip(&predictions).zip(&residuals);
         let records = parts.map(|((record, prediction), residuals)| {
@@ -107,22 +107,25 @@ pub fn bootstrap(
         let (place, _) = minimize(Pinned { problem: &again, bounds: again.bounds() }, best.clone())?;
         Some(estimate.unknowns.iter().zip(&place).map(|(u, &c)| u.transform.to_value(c)).collect())
     };
-    let counted = |number: usize| {
-        let found = refit(number);
+    // None of those that a limit or a flag left out or ended.
+    let counted = |number: usize| -> Option<Option<Vec<f64>>> {
+        let found = if control.stops() { return None } else { refit(number) };
         if let Some(counter) = &problem.settings.counter {
             counter.fetch_add(1, Ordering::Relaxed);
         }
-        found
+        (found.is_some() || !control.stops()).then_some(found)
     };
-    let found: Vec<Vec<f64>> = each(count, counted).into_iter().flatten().collect();
-    check_complete(problem, &control, "the bootstrap")?;
-    if found.len() < 20 {
+    let tried: Vec<Option<Vec<f64>>> = each(count, counted).into_iter().flatten().collect();
+    let begun = tried.len();
+    let found: Vec<Vec<f64>> = tried.into_iter().flatten().collect();
+    if found.len() < LEAST {
+        check_complete(problem, &control, "the bootstrap")?;
         return Err(Error::Option(format!(
             "only {} of {count} refits ended; twenty are the least, some thousand are wanted for percentiles",
             found.len()
         )));
     }
-    Ok(spread(estimate, &found, count, seed))
+    Ok(spread(estimate, &found, begun, seed))
 }
 
 /// Scatter and percentiles of the refits that ended, of `tried` in all.

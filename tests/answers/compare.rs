@@ -143,7 +143,7 @@ fn a_record_has_the_parameters_of_the_experiment_of_its_name() {
         assert!(untyped.outputs[0].iter().zip(&own.outputs).all(|(one, typed)| *one == typed.y));
     }
     let error = estimate.predict(&Polynomial, &record(5, 2.0, 0.4)).map(|_| ()).unwrap_err().to_string();
-    assert!(["`record 5`", "`b`", "(cold, warm)"].iter().all(|part| error.contains(part)), "{error}");
+    assert!(["`record 5`", "`b`", "(cold, warm;"].iter().all(|part| error.contains(part)), "{error}");
     // The slope of `b` is one: value and error are those of the second.
     let mut graph = Graph::default();
     let b = graph.leaf(Leaf::Parameter(1));
