@@ -479,7 +479,8 @@ fn each_record_has_its_own_parameter() {
         "--validation",
         "slow.csv",
     ];
-    let (out, remarks) = bench.ends(0, &twins);
+    let Output { stdout, stderr, .. } = bench.run(&twins);
+    let [out, remarks] = [stdout, stderr].map(|text| String::from_utf8(text).unwrap());
     let percents = out
         .lines()
         .filter(|line| line.contains("estimation"))
