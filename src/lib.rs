@@ -202,8 +202,8 @@ pub mod sweep;
 pub mod text;
 #[cfg(feature = "std")]
 mod transition;
-#[cfg(any(feature = "csv", feature = "text"))]
-#[cfg_attr(not(feature = "text"), allow(dead_code, reason = "columns of files need a part of it"))]
+#[cfg(feature = "std")]
+#[cfg_attr(not(feature = "text"), allow(dead_code, reason = "columns of files and their errors need a part of it"))]
 mod unit;
 #[cfg(feature = "std")]
 pub mod weighting;
