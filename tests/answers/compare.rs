@@ -170,8 +170,8 @@ fn a_record_has_the_parameters_of_the_experiment_of_its_name() {
 #[test]
 fn an_estimate_may_be_edited() {
     let records = [record(3, 2.0, 0.4).named("cold"), record(4, 5.0, 0.4).named("warm")];
-    let parameters = Cubic { a: free(0.0), b: free(0.0).per_experiment(), c: free(0.1) };
-    for records in [&records[..], &records[..1]] {
+    for (records, b) in [(&records[..], free(0.0).per_experiment()), (&records[..1], free(0.0))] {
+        let parameters = Cubic { a: free(0.0), b, c: free(0.1) };
         let mut edited = Fit::new(&Polynomial, records).parameters(parameters).run().unwrap().into_summary();
         edited.parameters[0].value = 7.0;
         assert_eq!(edited.of_record(records[0].record()).unwrap().parameters[0].value, 7.0);
