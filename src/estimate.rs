@@ -114,7 +114,7 @@ impl Summary {
     }
 
     /// This estimate for one experiment of the fit, by its place: where experiments have a parameter for themselves, with its value there and how well
-    /// that is known. It is the first experiment of what is returned. `None` if the fit had no experiment of this place.
+    /// that is known. What is returned has this experiment alone, at place 0. `None` if the fit had no experiment of this place.
     pub fn of_experiment(&self, experiment: usize) -> Option<Summary> {
         let own = self.experiments.get(experiment)?.clone();
         let mut found = self.clone();

@@ -112,7 +112,7 @@ pub(crate) enum Relation {
     Same,
     /// So many of the signal's is one of the column's.
     Factor(f64),
-    /// Scales of temperature that begin elsewhere: the signal's is so many times the column's, and then so much more.
+    /// Scales of temperature with other zeros: a number of the signal is `factor` times that of the column, plus `shift`.
     OtherZero { factor: f64, shift: f64 },
     /// Both are known, and neither is a multiple of the other.
     Other,
@@ -147,8 +147,8 @@ const TEMPERATURES: [(&[&str], f64, f64); 4] = [
     (&["degF", "°F", "℉"], 459.67 / 1.8, 1.0 / 1.8),
 ];
 
-/// How the unit `from` of a column stands to the unit `to` of a signal. A frequency (Hz, 1/min) that stands for an angular velocity counts
-/// revolutions, and so does one that an angular velocity stands for; but `1/s` for `rad/s` is one of radians.
+/// How the unit `from` of a column stands to the unit `to` of a signal. Between a frequency (Hz, 1/min) and an angular velocity one revolution is
+/// 2 pi rad, both ways; but a column in `rad/s` has the numbers of a signal in `1/s`.
 pub(crate) fn relation(from: &str, to: &str) -> Relation {
     let (from, to) = (from.trim(), to.trim());
     // A number is an index: `AI[2]`.
@@ -194,7 +194,7 @@ fn names_angle(text: &str) -> bool {
     ["rad", "deg", "°", "rev", "turn", "rpm"].iter().any(|angle| text.contains(angle))
 }
 
-/// Whether a unit counts what comes in a second, or how that changes, and its text names no angle. `1/s^2` is an angular acceleration as well.
+/// Whether a unit is a frequency or, in `Hz`, the rate of one, and its text names no angle. `1/s^2` is not asked: it is written for `rad/s^2`, too.
 fn counts(text: &str, unit: &Unit) -> bool {
     let per_second = Unit::one().over(&Unit::second());
     let rate = unit.same_dimension(&per_second) || text.contains("Hz") && unit.same_dimension(&per_second.power(2.0));

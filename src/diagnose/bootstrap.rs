@@ -32,7 +32,7 @@ pub struct Bootstrap {
     pub unknowns: Vec<String>,
     /// Refits that ended; the others are left out.
     pub converged: u64,
-    /// Refits tried: fewer than were asked for where a time limit or a flag ended them.
+    /// Refits tried. Where a time limit or a flag ended them, they are the first of those that were asked for.
     pub tried: u64,
     /// Standard deviation of each unknown over the refits.
     #[serde(with = "crate::real")]
@@ -51,6 +51,8 @@ pub struct Bootstrap {
 
 /// The fewest refits that have percentiles.
 const LEAST: usize = 20;
+/// Refits run side by side; at most so many are left out where a time limit or a flag ends them.
+const TOGETHER: usize = 64;
 
 /// Refits `count` records made of the prediction and resampled residuals, from the estimate on.
 ///
@@ -107,7 +109,7 @@ pub fn bootstrap(
         let (place, _) = minimize(Pinned { problem: &again, bounds: again.bounds() }, best.clone())?;
         Some(estimate.unknowns.iter().zip(&place).map(|(u, &c)| u.transform.to_value(c)).collect())
     };
-    // None of those that a limit or a flag left out or ended.
+    // `None` of a refit that a time limit or a flag kept from its beginning or its end.
     let counted = |number: usize| -> Option<Option<Vec<f64>>> {
         let found = if control.stops() { return None } else { refit(number) };
         if let Some(counter) = &problem.settings.counter {
@@ -115,7 +117,16 @@ pub fn bootstrap(
         }
         (found.is_some() || !control.stops()).then_some(found)
     };
-    let tried: Vec<Option<Vec<f64>>> = each(count, counted).into_iter().flatten().collect();
+    // Those before the first that is missing, so that as many refits with this seed are the same.
+    let mut tried: Vec<Option<Vec<f64>>> = vec![];
+    for first in (0..count).step_by(TOGETHER) {
+        let block = each(TOGETHER.min(count - first), |i| counted(first + i));
+        let wanted = tried.len() + block.len();
+        tried.extend(block.into_iter().map_while(|refit| refit));
+        if tried.len() < wanted {
+            break;
+        }
+    }
     let begun = tried.len();
     let found: Vec<Vec<f64>> = tried.into_iter().flatten().collect();
     if found.len() < LEAST {

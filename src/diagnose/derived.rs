@@ -86,7 +86,7 @@ pub fn derived_by(estimate: &Summary, experiment: usize, name: &str, graph: &Gra
 
 fn of(estimate: &Summary, experiment: usize, name: &str, f: &dyn Fn(&[Dual<LANES>]) -> Dual<LANES>) -> Derived {
     let own = estimate.of_experiment(experiment);
-    // No experiment of this place has the parameters that each has for itself.
+    // Without an experiment of this place, parameters that each experiment has for itself have no value.
     let missing = if own.is_none() { estimate.own_parameters() } else { vec![] };
     let of = own.as_ref().unwrap_or(estimate).parameters.iter().enumerate();
     let values: Vec<f64> = of.map(|(j, of)| if missing.contains(&j) { f64::NAN } else { of.value }).collect();

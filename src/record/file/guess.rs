@@ -99,7 +99,7 @@ impl Form {
                 among.peek().is_some() && among.all(|cell| !cell.is_empty() && !is_value(cell))
             };
             let after = lines.get(at + 2).map(|line| cells(file, separator, line.text));
-            // The unit of a ratio is written as a number: each cell that is none stands above one.
+            // The unit of a ratio is written `1`; every other cell of such a row is a text above a number.
             let above = |(unit, below): (&String, &String)| unit == "1" || !is_value(unit) && is_value(below);
             let units_and_ones =
                 |after: &[String]| units.iter().any(|unit| unit != "1") && units.iter().zip(after).all(above);

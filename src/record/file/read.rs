@@ -215,7 +215,7 @@ impl DataFile {
                 let (file, model) = (file.into(), signal.unit.as_str().into());
                 Err(Error::Unit { path, column, file, signal: signal_name, model, factor })
             };
-            // Without a unit a signal is a number, if a column is said to be converted to it.
+            // A signal without a unit counts as a ratio where the unit of its column was said.
             let model = if signal.unit.is_empty() && said.unit.is_some() { "1" } else { &signal.unit };
             match (relation(file, model), said.unit.is_some()) {
                 (Relation::Same, _) => {}
