@@ -68,6 +68,8 @@ pub struct Problem<'a> {
     pub(crate) prepared: Vec<Prepared>,
     pub(crate) unknowns: Arc<Unknowns>,
     pub(crate) settings: Settings,
+    /// Whether noise was asked for that a predictor of variances leaves out.
+    pub(crate) leaves_noise_out: bool,
     /// Mean of `psi(z) z` for Gaussian `z`; needed where variances are predicted, one for least squares.
     pub(crate) kappa: f64,
     pub(crate) cuts: Cuts,
@@ -118,6 +120,8 @@ impl<'a> Problem<'a> {
         let unknowns = Arc::new(Unknowns::new(&*sweep, &records, parameters)?);
         let prepared = Problem::prepared(&*sweep, &records, parameters)?;
         unknowns.check_starts(&*sweep, &records)?;
+        let estimated = matches!(settings.noise, Noise::PerOutput | Noise::Predicted);
+        let leaves_noise_out = sweep.predicts_variance() && !estimated;
         let settings = settings.of(&*sweep);
         let kappa = match &settings.loss {
             Some(loss) if sweep.predicts_variance() => expected_slope(&**loss),
@@ -125,7 +129,19 @@ impl<'a> Problem<'a> {
         };
         let cuts = Cuts::new(&*sweep, &records, settings.prefilter.is_some());
         let (method, refines, finer) = (0, false, None);
-        Ok(Problem { sweep, records, prepared, unknowns, settings, kappa, cuts, method, refines, finer })
+        Ok(Problem {
+            sweep,
+            records,
+            prepared,
+            unknowns,
+            settings,
+            leaves_noise_out,
+            kappa,
+            cuts,
+            method,
+            refines,
+            finer,
+        })
     }
 
     fn prepared(sweep: &dyn Sweep, records: &[Record], parameters: &[Parameter]) -> Result<Vec<Prepared>, Error> {

@@ -206,6 +206,11 @@ pub trait Sweep: Send + Sync {
         None
     }
 
+    /// The parameters that stand in the noise of the model alone, as far as that is known: a simulation does not depend on them.
+    fn levels(&self) -> &[usize] {
+        &[]
+    }
+
     /// Prepares a record, once, with the parameters at their start values.
     ///
     /// # Errors

@@ -1,7 +1,9 @@
 //! The sandwich covariance, for fits with weights, a robust loss or a pre-filter.
 //!
 //! It is `A^-1 B A^-1` (Huber 1967; White 1980). `A` is the curvature of the cost, `E[psi'] sum w g g'`. `B` is the
-//! covariance of the score: the sum of squares of the samples' own scores, `w psi(z) g` added up over the outputs.
+//! covariance of the score: the sum of squares of the samples' own scores, `w psi(z) g` added up over the outputs. Where variances `v` are
+//! predicted, of `rho(z) + kappa/2 ln v`, `A` has `E[psi'(z) z^2 + psi(z) z]/2 sum w d d'` beside it and the score `w (psi(z) z - kappa)
+//! d/sqrt(2)`, with `d = dv / (sqrt(2) v)`.
 //! Errors of a fit are smaller than the noise by the part of it that the fit took over, so each is divided by one less
 //! its leverage (HC3: MacKinnon and White, J. Econometrics 29 (1985) 305), and what this leaves out is added ([`scores`]).
 //!
@@ -39,6 +41,8 @@ pub(crate) struct Bread {
     pub linear: Linearization,
     /// Mean of `psi'`, by which it is to be multiplied.
     pub curvature: f64,
+    /// The root of the curvature along the logarithm of a variance relative to that along a mean.
+    variance: f64,
     /// The variance of errors times the roots of their weights, by their influences.
     noise: f64,
     tally: Tally,
@@ -54,7 +58,8 @@ impl Bread {
         }
         let priors: f64 = objective.problem.unknowns.priors(&end.coordinates).map(|(_, _, error)| error * error).sum();
         let noise = (linear.sum_of_squares() - priors) / measured.max(1) as f64;
-        Some(Bread { linear: (*linear).clone(), curvature: 1.0, noise, tally: Tally::new(objective.outputs()) })
+        let tally = Tally::new(objective.outputs());
+        Some(Bread { linear: (*linear).clone(), curvature: 1.0, variance: 1.0, noise, tally })
     }
 
     fn weighted(objective: &Objective<'_>, coordinates: &[f64]) -> Option<Self> {
@@ -62,21 +67,32 @@ impl Bread {
         let make = |experiment: usize| {
             let columns = unknowns.columns(experiment).count();
             let impulse = objective.problem.settings.prefilter.as_ref().map(ImpulseResponse::new);
-            let (tally, rows) = (Tally::new(objective.outputs()), Gathering::new(columns));
-            Curvature { objective, experiment, tally, rows, impulse, row: vec![0.0; columns] }
+            let rows = || Gathering::new(columns);
+            let tally = Tally::new(objective.outputs());
+            let variances = objective.sweep.predicts_variance().then(rows);
+            Curvature { objective, experiment, tally, rows: rows(), variances, impulse, row: vec![0.0; columns] }
         };
         let mut tally = Tally::new(objective.outputs());
         let mut triangles = vec![];
         for one in objective.gather(coordinates, true, make).ok()? {
-            triangles.push(one.rows.triangle());
+            triangles.push((one.rows.triangle(), one.variances.map(Gathering::triangle)));
             tally.add(one.tally);
         }
         let curvature = tally.curvature / tally.weights;
+        let variance = (tally.along_variance / tally.curvature).max(0.0).sqrt();
+        let joined = |(mut means, variances): (Information, Option<Information>)| {
+            if let Some(mut variances) = variances {
+                variances.scale_columns(&vec![variance; variances.columns()]);
+                means.merge(&variances);
+            }
+            means
+        };
+        let mut triangles: Vec<Information> = triangles.into_iter().map(joined).collect();
         // A prior is a measurement of unit variance; all is multiplied by the mean curvature later.
         unknowns.add_priors(coordinates, curvature.max(f64::MIN_POSITIVE).sqrt().recip(), &mut triangles);
         let linear = Linearization::new(0.0, unknowns.shared(), triangles);
         let noise = tally.squares / tally.count.max(1.0) / (curvature * curvature);
-        Some(Bread { linear, curvature, noise, tally })
+        Some(Bread { linear, curvature, variance, noise, tally })
     }
 
     /// Sums of `psi'` and of its squares over all measurements, and the number of these.
@@ -87,7 +103,7 @@ impl Bread {
 
     /// The accumulator of the scores of an experiment, by the inverse of the curvature.
     pub fn scores<'o>(&self, objective: &'o Objective<'o>, inverse: &Covariance, e: usize) -> Scores<'o> {
-        Scores::new(objective, e, of_experiment(objective, inverse, e), self.noise)
+        Scores::new(objective, e, of_experiment(objective, inverse, e), self.noise, self.variance)
     }
 
     /// `A^-1 B A^-1` over all unknowns that are not held, of scores of which the squares are to be multiplied by a number.
@@ -100,6 +116,8 @@ impl Bread {
 struct Tally {
     weights: f64,
     curvature: f64,
+    /// Sum of the curvatures along the logarithm of a predicted variance.
+    along_variance: f64,
     /// Sums of the products of two outputs' influences.
     influence: DMatrix<f64>,
     /// Sums of the variance that white noise of variance one would have.
@@ -116,6 +134,7 @@ impl Tally {
         Tally {
             weights: 0.0,
             curvature: 0.0,
+            along_variance: 0.0,
             influence: DMatrix::zeros(outputs, outputs),
             expected: vec![0.0; outputs],
             squares: 0.0,
@@ -127,6 +146,7 @@ impl Tally {
     fn add(&mut self, other: Tally) {
         self.weights += other.weights;
         self.curvature += other.curvature;
+        self.along_variance += other.along_variance;
         self.influence += other.influence;
         self.expected.iter_mut().zip(other.expected).for_each(|(sum, other)| *sum += other);
         self.squares += other.squares;
@@ -193,12 +213,13 @@ fn filtered_scores(
     Some((scores, expected / (expected - taken).max(f64::MIN_POSITIVE)))
 }
 
-/// The triangle of `sqrt(w) g`, and sums of the errors.
+/// The triangle of `sqrt(w) g`, that of `sqrt(w) d` where variances are predicted, and sums of the errors.
 struct Curvature<'c> {
     objective: &'c Objective<'c>,
     experiment: usize,
     tally: Tally,
     rows: Gathering,
+    variances: Option<Gathering>,
     impulse: Option<ImpulseResponse<'c>>,
     row: Vec<f64>,
 }
@@ -222,9 +243,16 @@ impl Accumulate for Curvature<'_> {
                 self.tally.expected[j] += expected;
                 self.tally.squares += w * psi[j] * psi[j];
                 self.tally.count += 1.0;
-                let values = window.row(k, j).iter().skip(lane).step_by(lanes);
-                self.row.iter_mut().zip(values).for_each(|(to, from)| *to = from * w.sqrt());
-                self.rows.take(&self.row, 0.0);
+                self.tally.along_variance += w * 0.5 * (slope * z + psi[j]) * z;
+                let mut take = |row: &[f64], rows: &mut Gathering| {
+                    let values = row.iter().skip(lane).step_by(lanes);
+                    self.row.iter_mut().zip(values).for_each(|(to, from)| *to = from * w.sqrt());
+                    rows.take(&self.row, 0.0);
+                };
+                take(window.row(k, j), &mut self.rows);
+                if let Some(variances) = &mut self.variances {
+                    take(window.variance_row(k, j), variances);
+                }
             }
             for (i, j) in (0..outputs).flat_map(|i| (0..outputs).map(move |j| (i, j))) {
                 self.tally.influence[(i, j)] += psi[i] * psi[j];
@@ -234,6 +262,7 @@ impl Accumulate for Curvature<'_> {
 
     fn append(&mut self, later: Self) {
         self.rows.append(later.rows);
+        self.variances.iter_mut().zip(later.variances).for_each(|(own, later)| own.append(later));
         self.tally.add(later.tally);
     }
 }

@@ -74,23 +74,28 @@ impl Shares {
         self.moved.len()
     }
 
-    /// By how much an error of one would move each unknown, of the measurement that was taken last.
+    /// By how much an error of one would move each unknown, by the slopes of the last call.
     pub fn moved(&self) -> &[f64] {
         &self.moved
     }
 
-    /// Takes a measurement with these slopes and this error, and returns its leverage.
-    pub fn take(&mut self, weight: f64, slopes: &[f64], error: f64, (output, sample): (usize, usize)) -> f64 {
+    /// Sets by how much an error of one would move each unknown, and returns by how much it would move its own prediction.
+    pub fn move_by(&mut self, slopes: &[f64]) -> f64 {
         self.moved.fill(0.0);
         for (column, slope) in self.inverse.column_iter().zip(slopes) {
             self.moved.iter_mut().zip(&column).for_each(|(moved, entry)| *moved += entry * slope);
         }
+        self.moved.iter().zip(slopes).map(|(moved, slope)| moved * slope).sum()
+    }
+
+    /// Takes a measurement with these slopes and this error, and returns its leverage.
+    pub fn take(&mut self, weight: f64, slopes: &[f64], error: f64, (output, sample): (usize, usize)) -> f64 {
+        let leverage = weight * self.move_by(slopes);
         for (c, (moved, largest)) in self.moved.iter().zip(&mut self.largest).enumerate() {
             let part = weight * moved * moved / self.inverse[(c, c)];
             self.parts[c] = part;
             largest.take(Share { part, experiment: self.experiment, output, sample });
         }
-        let leverage = weight * self.moved.iter().zip(slopes).map(|(moved, slope)| moved * slope).sum::<f64>();
         // The error of a measurement that alone determines an unknown is rounding.
         if 1.0 - leverage > ALONE {
             self.sizes.take(&self.parts, weight * error * error / (1.0 - leverage));

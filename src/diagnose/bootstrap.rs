@@ -54,10 +54,12 @@ const LEAST: usize = 20;
 /// Refits run side by side; at most so many are left out where a time limit or a flag ends them.
 const TOGETHER: usize = 64;
 
-/// Refits `count` records made of the prediction and resampled residuals, from the estimate on.
+/// Refits `count` records made of the simulation and resampled residuals, from the estimate on. Residuals of weighted samples are resampled
+/// times the roots of their weights, as errors of one size.
 ///
 /// # Errors
-/// An estimate of another problem or one that cannot be simulated, blocks longer than half of an experiment, fewer than twenty
+/// A predictor that takes in measurements (a filter, [`Horizon`](crate::Horizon)): records made of its predictions are not those of a
+/// disturbed plant. An estimate of another problem or one that cannot be simulated, blocks longer than half of an experiment, fewer than twenty
 /// refits that end. A time limit or a flag ends it with the refits so far, or is an error where they are fewer.
 ///
 /// ```
@@ -84,10 +86,23 @@ pub fn bootstrap(
 ) -> Result<Bootstrap, Error> {
     let control = problem.control(Instant::now());
     let (objective, best) = problem.at_within(estimate, &control)?;
+    if problem.sweep.predicts_variance() || problem.sweep.restarts().is_some() {
+        return Err(Error::Option(format!(
+            "the bootstrap makes records of a simulation and its errors; {} takes in the measurements, so that its errors are also those of a \
+             disturbed plant, which no such record has; take diagnose::profile",
+            problem.sweep.predictor()
+        )));
+    }
     let predictions = (0..objective.experiments()).map(|e| objective.predict(e, &best));
     let predictions = predictions.collect::<Result<Vec<_>, _>>()?;
     check_complete(problem, &control, "the bootstrap")?;
-    let residuals: Vec<Vec<Vec<f64>>> = predictions.iter().map(centered).collect();
+    let roots = (0..objective.experiments()).map(|e| {
+        let root = |k: usize| objective.weight(e, k).sqrt();
+        (0..problem.records()[e].len()).map(root).collect()
+    });
+    let roots: Vec<Vec<f64>> = roots.collect();
+    let of = |(prediction, roots): (&Simulated, &Vec<f64>)| centered(prediction, roots);
+    let residuals: Vec<Vec<Vec<f64>>> = predictions.iter().zip(&roots).map(of).collect();
     if let Some(e) = residuals.iter().position(Vec::is_empty) {
         let experiment = problem.records()[e].name().to_owned();
         return Err(Error::TooFewSamples {
@@ -100,9 +115,9 @@ pub fn bootstrap(
     check_blocks(problem, &residuals, resampling)?;
     let refit = |number: usize| -> Option<Vec<f64>> {
         let mut random = Random::stream(seed, number as u64);
-        let parts = problem.records().iter().zip(&predictions).zip(&residuals);
-        let records = parts.map(|((record, prediction), residuals)| {
-            resampled(record, prediction, draw(residuals, record.len(), resampling, &mut random))
+        let records = problem.records().iter().enumerate().map(|(e, record)| {
+            let drawn = draw(&residuals[e], record.len(), resampling, &mut random);
+            resampled(record, &predictions[e], drawn, &roots[e])
         });
         let again = objective.problem.with_records(records.collect()).ok()?;
         let again = objective.of(&again, objective.sweep);
@@ -195,15 +210,17 @@ fn check_blocks(problem: &Problem<'_>, residuals: &[Vec<Vec<f64>>], resampling: 
     }
 }
 
-/// The residuals of the samples of which all outputs have one, sample by sample. Centered: a mean that the model left would
-/// be counted as noise.
-fn centered(prediction: &Simulated) -> Vec<Vec<f64>> {
-    let means: Vec<f64> = prediction.residuals.iter().map(|column| mean(column)).collect();
-    let samples = prediction.residuals.first().map_or(0, Vec::len);
-    let row = |k: usize| -> Vec<f64> {
-        prediction.residuals.iter().zip(&means).map(|(column, mean)| column[k] - mean).collect()
+/// The residuals, times the roots of their weights, of the samples with a weight of which all outputs have one, sample by sample. Centered: a
+/// mean that the model left would be counted as noise.
+fn centered(prediction: &Simulated, roots: &[f64]) -> Vec<Vec<f64>> {
+    let weighted = |column: &Vec<f64>| -> Vec<f64> {
+        let of = |(e, root): (&f64, &f64)| if *root > 0.0 { e * root } else { f64::NAN };
+        column.iter().zip(roots).map(of).collect()
     };
-    (0..samples).map(row).filter(|row| row.iter().all(|e| e.is_finite())).collect()
+    let columns: Vec<Vec<f64>> = prediction.residuals.iter().map(weighted).collect();
+    let means: Vec<f64> = columns.iter().map(|column| mean(column)).collect();
+    let row = |k: usize| -> Vec<f64> { columns.iter().zip(&means).map(|(column, mean)| column[k] - mean).collect() };
+    (0..columns.first().map_or(0, Vec::len)).map(row).filter(|row| row.iter().all(|e| e.is_finite())).collect()
 }
 
 fn mean(values: &[f64]) -> f64 {
@@ -212,12 +229,14 @@ fn mean(values: &[f64]) -> f64 {
     if count > 0.0 { sum / count } else { 0.0 }
 }
 
-/// The record that the prediction and these errors make; what was not measured stays so.
-fn resampled(record: &Record, prediction: &Simulated, errors: Vec<Vec<f64>>) -> Record {
+/// The record that the prediction and these errors, times the roots of the weights, make; what was not measured, or has no weight, stays so.
+fn resampled(record: &Record, prediction: &Simulated, errors: Vec<Vec<f64>>, roots: &[f64]) -> Record {
     let outputs = record.outputs.iter().enumerate().map(|(j, channel)| {
-        let rows = channel.values.iter().zip(&prediction.outputs[j]).zip(&errors);
-        let drawn = |((old, new), e): ((&f64, &f64), &Vec<f64>)| if old.is_nan() { f64::NAN } else { new + e[j] };
-        channel.with(rows.map(drawn).collect::<Vec<f64>>())
+        let drawn = |(k, old): (usize, &f64)| match roots[k] > 0.0 && !old.is_nan() {
+            true => prediction.outputs[j][k] + errors[k][j] / roots[k],
+            false => *old,
+        };
+        channel.with(channel.values.iter().enumerate().map(drawn).collect::<Vec<f64>>())
     });
     Record { outputs: outputs.collect(), ..record.clone() }
 }

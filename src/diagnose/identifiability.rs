@@ -151,7 +151,8 @@ fn examine(problem: &Problem<'_>, estimate: &Summary, warned: &[Direction]) -> R
         excitation,
         advice: vec![],
     };
-    result.advice = advice::advice(&result, warned, &estimate.unknowns, problem.records[0].time_unit());
+    let levels = if problem.sweep.predicts_variance() { &[] } else { problem.sweep.levels() };
+    result.advice = advice::advice(&result, (warned, levels), &estimate.unknowns, problem.records[0].time_unit());
     Ok(result)
 }
 

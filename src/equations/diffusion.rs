@@ -1,7 +1,7 @@
 //! Equations without their process noise, and the parameters that are its levels.
 
 use super::{Equations, Roots, evaluate};
-use crate::graph::{Leaf, Node};
+use crate::graph::{Id, Leaf, Node};
 
 /// What makes up the process noise of equations.
 #[derive(Clone, Debug, PartialEq)]
@@ -18,23 +18,34 @@ pub(crate) struct Diffusion {
 const PLACE: f64 = 0.7;
 
 impl Equations {
+    /// Whether these depend on each parameter.
+    fn depend(&self, roots: &[Id]) -> Vec<bool> {
+        let reached = self.graph.reached(roots);
+        let mut parameters = vec![false; self.layout.parameters.len()];
+        for (node, _) in self.graph.nodes().iter().zip(reached).filter(|(_, reached)| *reached) {
+            if let Node::Leaf(Leaf::Parameter(i)) = node {
+                parameters[*i as usize] = true;
+            }
+        }
+        parameters
+    }
+
+    /// The parameters that stand in its noise alone.
+    pub(crate) fn levels(&self) -> Vec<usize> {
+        let Roots { diffusion, noise, initial_noise, .. } = &self.roots;
+        let of_noise = self.depend(&[&**diffusion, noise, initial_noise].concat());
+        let none = Roots { diffusion: vec![], noise: vec![], initial_noise: vec![], ..self.roots.clone() };
+        let of_others = self.depend(&none.all());
+        (0..of_noise.len()).filter(|&i| of_noise[i] && !of_others[i]).collect()
+    }
+
     /// Its process noise, with parameters of these values, some of which are free.
     pub(crate) fn process_noise(&self, p: &[f64], free: &[bool]) -> Diffusion {
         let number = |i: usize| self.roots.diffusion.get(i).map(|root| self.graph.known(*root));
         let states: Vec<usize> =
             (0..self.layout.states.len()).filter(|i| number(*i).is_some_and(|known| known != Some(0.0))).collect();
-        let depends = |roots: &Roots| {
-            let reached = self.graph.reached(&roots.all());
-            let mut parameters = vec![false; self.layout.parameters.len()];
-            for (node, _) in self.graph.nodes().iter().zip(reached).filter(|(_, reached)| *reached) {
-                if let Node::Leaf(Leaf::Parameter(i)) = node {
-                    parameters[*i as usize] = true;
-                }
-            }
-            parameters
-        };
-        let of_diffusion = depends(&Roots { diffusion: self.roots.diffusion.clone(), ..Roots::default() });
-        let of_others = depends(&Roots { diffusion: vec![], ..self.roots.clone() });
+        let of_diffusion = self.depend(&self.roots.diffusion);
+        let of_others = self.depend(&Roots { diffusion: vec![], ..self.roots.clone() }.all());
         let levels: Vec<usize> = (0..free.len()).filter(|&i| free[i] && of_diffusion[i] && !of_others[i]).collect();
         let mut p = p.to_vec();
         levels.iter().for_each(|level| p[*level] = 0.0);

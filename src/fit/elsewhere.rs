@@ -14,7 +14,7 @@ use std::time::{Duration, Instant};
 /// Starts of a fit whose first search left an output unexplained, the declared one among them: of 138 records of predators
 /// and prey 16 starts led 118 to the right minimum, 24 led 133, 32 led 136.
 const STARTS: usize = 32;
-const UNEXPLAINED: &str = "the search from the declared start ended where an output is left unexplained";
+const UNEXPLAINED: &str = "the search ended where an output is left unexplained";
 /// Most trial steps of a further search: so many, or so many times those of the search before, by where it begins.
 const LEAST_TRIALS: u64 = 100;
 const FROM_A_START: u64 = 1;
@@ -200,15 +200,15 @@ impl Problem<'_> {
 
     /// Further searches where an estimate leaves an output unexplained: in stages, and from further starts where the minimum that the stages lead
     /// to is not usable, nor its errors near the noise, unless records are long. They run by the default method; the best minimum goes on by finer ones
-    /// where only the step is wrong with it. `None` where stages or a number of starts were asked for, where the measurements tell nothing by any
-    /// parameters, and where the variance is predicted: that likelihood has no bound at noise levels of zero, which some start would find.
+    /// where only the step is wrong with it. After stages that were asked for they are from further starts. `None` where a number of starts was asked
+    /// for, where the measurements tell nothing by any parameters, and where the variance is predicted: that likelihood has no bound at noise levels
+    /// of zero, which some start would find.
     pub(super) fn search_further(&self, found: &Summary, control: &Control) -> Option<Further> {
         let hopeless = [WarningCode::ConstantOutput, WarningCode::TooFewMeasurements];
         let predicted = self.settings.noise == Noise::Predicted;
         if control.stops()
             || !leaves_unexplained(found)
             || self.settings.searches != SearchPlan::Single
-            || self.settings.lead != Lead::Declared
             || predicted
             || hopeless.into_iter().any(|code| is_useless(found, code))
         {
@@ -220,7 +220,8 @@ impl Problem<'_> {
             let (best, stopped, time) = (Box::new(best), control.stops(), begin.elapsed());
             Further::Found { best, way, stopped, time }
         };
-        let staged = self.searched_in_stages(begin, control).map(|(best, led)| (best, Way::Stages(led)));
+        let in_stages = || self.searched_in_stages(begin, control).map(|(best, led)| (best, Way::Stages(led)));
+        let staged = if self.settings.lead == Lead::Declared { in_stages() } else { None };
         let most = if self.runs_in_lanes() { LONGEST_IN_LANES } else { LONGEST };
         if self.samples() > most {
             return Some(staged.map_or(Further::TooLong(most), further));
@@ -253,7 +254,8 @@ impl Problem<'_> {
 
     /// The best minimum from further starts, by finer methods where only the step is wrong with it.
     fn searched_from_starts(&self, trials: u64, begin: Instant, control: &Control) -> Option<Summary> {
-        let settings = Settings { checkpoint: None, searches: SearchPlan::Best(STARTS), ..self.settings.clone() };
+        let (searches, lead) = (SearchPlan::Best(STARTS), Lead::Declared);
+        let settings = Settings { checkpoint: None, searches, lead, ..self.settings.clone() };
         let problem = Problem { settings, finer: None, ..self.clone() };
         let start = Start { trials, ..Start::declared(&problem) };
         let again = problem.run_within(begin, control, start).ok()?;

@@ -9,7 +9,7 @@ use std::fmt;
 
 /// The least samples of a piece.
 const LEAST: usize = 8;
-/// Pieces of half the length follow where an end is not near the noise; so many lengths are tried.
+/// Pieces of half the length follow where an end is not near the noise, unless it is that of the pieces before; so many lengths are tried.
 const LENGTHS: usize = 4;
 /// A search with fixed multipliers ends where the next step would lower the cost by this part. Multipliers that change before, or a penalty that rises,
 /// lead to other minima. After so many trial steps it goes on only if the error of the pieces is below [`UNEXPLAINED`], up to so many times.
@@ -20,10 +20,13 @@ const ROUNDS: usize = 40;
 /// The penalty rises where the largest gap did not shrink to this part; after so many searches in which it did not, rounding is what is left.
 const SHRUNK: f64 = 0.25;
 const STUCK: usize = 6;
-/// The last search is the one after which the largest gap is at most this part of the noise: a chaotic plant makes gaps larger by a factor of 1e8.
+/// The last search is the one after which the largest gap is at most this part of the noise: a chaotic plant makes gaps larger by a factor of 1e8. Far
+/// from the noise the last one is that which closes continuity.
 const LAST: f64 = 1e-9;
 /// Continuity is closed where the largest gap is at most this part of the noise.
 const CLOSED: f64 = 1e-3;
+/// Closed ends whose misfits differ by less than this part are one minimum.
+const SAME: f64 = 1e-3;
 
 /// The end of multiple shooting.
 pub(super) struct Shot {
@@ -103,10 +106,12 @@ pub(super) fn shoot(
         };
         evaluations += shot.evaluations;
         let order = |shot: &Shot| (shot.gap > CLOSED, shot.misfit);
+        let closed = |shot: &Shot| (shot.gap <= CLOSED).then_some(shot.misfit);
+        let again = best.as_ref().and_then(closed).zip(closed(&shot)).is_some_and(|(a, b)| (a - b).abs() < SAME * a);
         if best.as_ref().is_none_or(|best| order(&shot) < order(best)) {
             best = Some(shot);
         }
-        if best.as_ref().is_some_and(Shot::explains) || explained == LEAST || control.stops() {
+        if best.as_ref().is_some_and(Shot::explains) || again || explained == LEAST || control.stops() {
             break;
         }
         length = (explained / 2).max(LEAST);
@@ -210,8 +215,8 @@ impl<'s> Aim<'s> {
             let gap = passed.gaps.iter().fold(0.0, |most: f64, gap| most.max(gap.abs())) / self.part;
             let misfit = self.misfit(passed.cost);
             let coordinates = shooting.coordinates(&x);
-            // A search for parameters that explain pieces without continuity has not come near the noise.
-            let lost = limited && misfit > NEAR;
+            // Parameters that explain the pieces without continuity, or with it, have not come near the noise.
+            let far = (limited || gap <= CLOSED) && misfit > NEAR;
             shot = Some(Shot {
                 coordinates,
                 nodes: shooting.nodes(&x),
@@ -225,7 +230,7 @@ impl<'s> Aim<'s> {
             } else {
                 stuck += 1;
             }
-            if gap <= LAST || lost || stuck >= STUCK || control.stops() {
+            if gap <= LAST || far || stuck >= STUCK || control.stops() {
                 break;
             }
             shooting.tighten(&passed.gaps, gap <= SHRUNK * before);

@@ -1,7 +1,7 @@
 //! Simulation of equations at the declared values of their parameters.
 
 use super::Fit;
-use super::fittable::Made;
+use super::fittable::{AnyStepping, Made};
 use crate::equations::Equations;
 use crate::error::Error;
 use crate::layout::{Layout, Quantity};
@@ -9,20 +9,36 @@ use crate::parameter::{Parameter, fixed};
 use crate::problem::{Control, Problem, Settings};
 use crate::record::{Channel, Initial, Record};
 
+/// Simulations whose outputs differ by this part are one: the finer one is nearer to the truth by a factor of a hundred and more.
+const NEAR: f64 = 1e-6;
+
 impl Fit<'_, Equations> {
-    /// Simulates the equations with the starts of the parameters, by the integrator (or one step per sample), from an initial state in
-    /// the order of the layout, as [`simulate`](crate::simulate()) does a Rust model; the records and other settings of the fit are not
-    /// used. `inputs` is a record of the inputs, with their holds; its outputs, if it has any, are not read. Gives it with the simulated
+    /// Simulates the equations with the starts of the parameters, by the integrator, from an initial state in the order of the layout, as
+    /// [`Simulator`](crate::Simulator) does a Rust model; the records and other settings of the fit are not used. Where no integrator was chosen,
+    /// steps of Runge and Kutta become finer until the outputs change by less than a part of 1e-6 of their size, and implicit steps follow where none
+    /// are fine enough. `inputs` is a record of the inputs, with their holds; its outputs, if it has any, are not read. Gives it with the simulated
     /// outputs, to which [`Record::with_noise`] adds noise; its initial state is to be estimated.
     ///
     /// # Errors
     /// Other inputs or states than the equations have, an initial state that is not finite; a simulation that fails.
     pub fn simulate(&self, initial: &[f64], inputs: &Record) -> Result<Record, Error> {
         let given = Initial::Given(initial.iter().copied().map(fixed).collect());
-        let outputs = vec![vec![0.0; inputs.len()]; self.model.layout().outputs.len()];
-        let problem = self.of_inputs(inputs, outputs, given)?;
-        let outputs = problem.in_units(&Control::NEVER).predict(0, &[])?.outputs;
-        with_outputs(self.model.layout(), inputs, outputs)
+        let zeros = vec![vec![0.0; inputs.len()]; self.model.layout().outputs.len()];
+        let by = |stepping: Option<&AnyStepping>| {
+            let problem = self.of_inputs(inputs, zeros.clone(), given.clone(), stepping)?;
+            Ok::<_, Error>(problem.in_units(&Control::NEVER).predict(0, &[])?.outputs)
+        };
+        let mut outputs = by(self.stepping.as_ref());
+        let finer = if self.stepping.is_none() { self.model.finer() } else { vec![] };
+        for stepping in &finer {
+            let again = by(Some(stepping));
+            let near = outputs.as_ref().is_ok_and(|outputs| again.as_ref().is_ok_and(|again| are_near(outputs, again)));
+            outputs = again;
+            if near {
+                break;
+            }
+        }
+        with_outputs(self.model.layout(), inputs, outputs?)
     }
 
     /// The state at the first sample of a record of inputs, as that declares it ([`Initial`]) or the model says it, with the starts of the parameters;
@@ -49,7 +65,7 @@ impl Fit<'_, Equations> {
             }
             other => other,
         };
-        let problem = self.of_inputs(inputs, outputs, initial).map_err(remedy)?;
+        let problem = self.of_inputs(inputs, outputs, initial, self.stepping.as_ref()).map_err(remedy)?;
         let start = problem.unknowns.start();
         let values = problem.in_units(&Control::NEVER).values_of(0, &start);
         if first {
@@ -59,13 +75,27 @@ impl Fit<'_, Equations> {
         Ok(values.x.into_iter().zip(follows).map(|(x, follows)| if follows { x } else { 0.0 }).collect())
     }
 
-    /// The problem of a record of inputs with these outputs.
-    fn of_inputs(&self, inputs: &Record, outputs: Vec<Vec<f64>>, initial: Initial) -> Result<Problem<'_>, Error> {
+    /// The problem of a record of inputs with these outputs, by an integrator.
+    fn of_inputs(
+        &self,
+        inputs: &Record,
+        outputs: Vec<Vec<f64>>,
+        initial: Initial,
+        stepping: Option<&AnyStepping>,
+    ) -> Result<Problem<'_>, Error> {
         let record = with_outputs(self.model.layout(), inputs, outputs)?.initial(initial)?;
         let parameters: Vec<Parameter> = self.parameters.iter().map(|parameter| fixed(parameter.start)).collect();
-        let sweep = Equations::sweep(self.model.lent(), self.stepping.as_ref(), None)?;
+        let sweep = Equations::sweep(self.model.lent(), stepping, None)?;
         Problem::unchecked(sweep, vec![record], &parameters, Settings::default())
     }
+}
+
+/// Whether no output of two simulations differs by more than a part of its largest value.
+fn are_near(outputs: &[Vec<f64>], again: &[Vec<f64>]) -> bool {
+    outputs.iter().zip(again).all(|(output, again)| {
+        let largest = again.iter().fold(0.0, |most: f64, y| most.max(y.abs()));
+        output.iter().zip(again).all(|(a, b)| (a - b).abs() <= NEAR * largest)
+    })
 }
 
 /// A record of inputs with outputs, its initial state to be estimated.

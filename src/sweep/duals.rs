@@ -7,10 +7,10 @@ use super::{
     Evaluated, Lacking, ModelCode, NoStart, Piece, Prepared, Reached, RunError, Seed, States, Sweep, Undisturbed,
     Visit, unmoved,
 };
-use crate::equations::WithTerms;
+use crate::equations::{Equations, WithTerms};
 use crate::error::{Error, Failure};
 use crate::functions::delays;
-use crate::graph::Choices;
+use crate::graph::{Choices, choices};
 use crate::integrate::{Method, stepped};
 use crate::layout::{Kind, Layout};
 use crate::predict::{FreeRun, Guess, Place, Prediction};
@@ -24,6 +24,19 @@ pub(crate) struct Uncompiled {
     pub reason: String,
     /// What their choices depend on; `None` where they are not read as a graph.
     pub choices: Option<Choices>,
+    /// The parameters that stand in their noise alone.
+    pub levels: Vec<usize>,
+}
+
+impl Uncompiled {
+    /// Equations that are not read as a graph.
+    pub fn unread(reason: String) -> Self {
+        Uncompiled { reason, ..Uncompiled::default() }
+    }
+
+    pub fn of(equations: &Equations, reason: String) -> Self {
+        Uncompiled { reason, choices: Some(choices(equations.graph())), levels: equations.levels() }
+    }
 }
 
 /// A model run in dual numbers.
@@ -80,6 +93,10 @@ impl Sweep for DualSweep<'_> {
 
     fn choosing(&self) -> Option<&[usize]> {
         self.uncompiled.choices.as_ref().map(|choices| &*choices.parameters)
+    }
+
+    fn levels(&self) -> &[usize] {
+        &self.uncompiled.levels
     }
 
     fn linearizes_choices(&self) -> bool {

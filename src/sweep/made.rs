@@ -5,7 +5,7 @@ use super::{DualSweep, Evaluated, ProgramSweep, Sweep};
 use crate::engine::only_duals;
 use crate::equations::Equations;
 use crate::error::Error;
-use crate::graph::{Untraceable, choices};
+use crate::graph::Untraceable;
 use crate::integrate::Method;
 use crate::predict::Prediction;
 use std::sync::Arc;
@@ -21,15 +21,14 @@ pub(crate) fn compiled<'a>(
     if let Some(reason) = &asked
         && !predictor.needs_slopes()
     {
-        return plain(Uncompiled { reason: reason.clone(), choices: None });
+        return plain(Uncompiled::unread(reason.clone()));
     }
     let equations = match trace() {
         Ok(equations) => equations,
-        Err(Untraceable { reason, .. }) => return plain(Uncompiled { reason, choices: None }),
+        Err(Untraceable { reason, .. }) => return plain(Uncompiled::unread(reason)),
     };
-    let choices = Some(choices(equations.graph()));
     let in_duals = |reason: String| {
-        let uncompiled = Uncompiled { reason, choices: choices.clone() };
+        let uncompiled = Uncompiled::of(&equations, reason);
         // The model's own code in duals has no slopes whose slopes are known, and does not say which inputs are never late.
         match predictor.needs_slopes() && !equations.is_affine() || equations.late().contains(&true) {
             true => evaluated(&equations, method, predictor, uncompiled),
@@ -63,8 +62,7 @@ pub(super) fn of_equations_in_duals(
     method: &Arc<dyn Method>,
     predictor: &Arc<dyn Prediction>,
 ) -> Arc<dyn Sweep> {
-    let choices = Some(choices(equations.graph()));
-    evaluated(equations, method, predictor, Uncompiled { reason: String::new(), choices })
+    evaluated(equations, method, predictor, Uncompiled::of(equations, String::new()))
 }
 
 /// The sweep of equations.

@@ -212,6 +212,10 @@ impl Sweep for ProgramSweep<'_> {
         self.plain.choosing()
     }
 
+    fn levels(&self) -> &[usize] {
+        self.plain.levels()
+    }
+
     fn linearizes_choices(&self) -> bool {
         self.plain.linearizes_choices()
     }

@@ -78,13 +78,14 @@ impl Rest {
             })
         };
         let mut x = state.to_vec();
-        let (mut f, mut rows) = slopes(&x);
+        let (mut f, rows) = slopes(&x);
+        let Some(mut here) = inverse(&rows, &f)? else { return Err(moving(&f, Change::Rate)) };
         // The largest state or step so far: where the state of rest is zero, a step of rounding is short against it.
         let mut longest = 0.0f64;
         for _ in 0..STEPS {
-            let Some(Inverse { inverse, units }) = inverse(&rows, &f)? else { return Err(moving(&f, Change::Rate)) };
-            let step = -(&inverse * DVector::from_column_slice(&f));
-            let length = |of: &[f64]| of.iter().zip(&units).map(|(x, unit)| (x / unit).abs()).fold(0.0, f64::max);
+            let Inverse { inverse: solve, units } = &here;
+            let step = -(solve * DVector::from_column_slice(&f));
+            let length = |of: &[f64]| of.iter().zip(units).map(|(x, unit)| (x / unit).abs()).fold(0.0, f64::max);
             let shortest = LAST * longest.max(length(&x));
             longest = longest.max(length(&x)).max(length(step.as_slice()));
             if length(step.as_slice()) <= shortest {
@@ -92,7 +93,7 @@ impl Rest {
                 let at_rest: Vec<Duals> = x.iter().map(|x| Dual::constant(*x)).collect();
                 let jumps: Vec<f64> = jumped(filter, &between, &at_rest, &p).iter().map(|jump| jump.value).collect();
                 return match length(&jumps) <= JUMP * longest {
-                    true => Ok(Rest { state: x, inverse }),
+                    true => Ok(Rest { state: x, inverse: here.inverse }),
                     false => Err(moving(&jumps, Change::AtSample)),
                 };
             }
@@ -100,13 +101,14 @@ impl Rest {
                 let part = 0.5f64.powi(halvings as i32);
                 let there: Vec<f64> = x.iter().zip(&step).map(|(x, step)| x + part * step).collect();
                 let (f, rows) = slopes(&there);
-                let next = &inverse * DVector::from_column_slice(&f);
+                let next = solve * DVector::from_column_slice(&f);
                 let shorter = length(next.as_slice()) <= (1.0 - 0.25 * part) * length(step.as_slice());
-                let finite = f.iter().chain(rows.iter().flatten()).all(|entry| entry.is_finite());
-                (finite && shorter).then_some((there, f, rows))
+                // Beyond a guard, such as the square root of `max(h, 0)`, no rate depends on the state.
+                let inverse = inverse(&rows, &f).ok().flatten().filter(|_| shorter)?;
+                Some((there, f, inverse))
             });
-            let Some((there, next, slopes)) = shortened else { return Err(moving(&f, Change::Rate)) };
-            (x, f, rows) = (there, next, slopes);
+            let Some((there, next, inverse)) = shortened else { return Err(moving(&f, Change::Rate)) };
+            (x, f, here) = (there, next, inverse);
         }
         Err(moving(&f, Change::Rate))
     }

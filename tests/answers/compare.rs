@@ -7,8 +7,8 @@ use greybox::diagnose::{
 };
 use greybox::graph::{Graph, Leaf};
 use greybox::{
-    Error, Estimate, Experiment, Fit, Kind, Model, Nothing, Parameter, Scalar, Severity, Summary, Time, fixed, free,
-    signals,
+    Error, Estimate, Experiment, Fit, Kind, Model, Nothing, Parameter, Sample, Scalar, Severity, Summary, Time, fixed,
+    free, signals,
 };
 
 signals! { struct Input { u: "V" } }
@@ -203,6 +203,31 @@ fn a_bootstrap_scatters_as_the_errors_say() {
         for (end, side) in [(lower, -1.0), (upper, 1.0)] {
             assert!((end - unknown.value - side * 1.96 * error).abs() < 0.5 * error, "{found:?} {unknown:?}");
         }
+    }
+}
+
+/// Two halves of noise 0.1 and 2, weighted by the inverse of their squares: refits scatter as the standard errors say, not as residuals of both
+/// sizes in either half would make them, 5 times as much.
+#[test]
+fn a_bootstrap_of_weighted_records() {
+    let (quiet, other) = (record(7, 2.0, 0.3), record(8, 2.0, 0.3));
+    let louder = |(u, y): (Input, Output)| {
+        let clean = 1.0 + 2.0 * u.u + 0.3 * u.u * u.u;
+        Output { y: clean + 20.0 * (y.y - clean) }
+    };
+    let inputs: Vec<Input> = quiet.inputs().chain(other.inputs()).collect();
+    let outputs: Vec<Output> = quiet.outputs().chain(other.inputs().zip(other.outputs()).map(louder)).collect();
+    let half = quiet.len() as f64;
+    let joined = Experiment::new(&Polynomial, Time::Uniform { start: 0.0, step: 1.0 }, inputs, outputs).unwrap();
+    let fit = Fit::new(&Polynomial, &joined).parameters(Cubic { a: free(0.0), b: free(0.0), c: free(0.0) });
+    let weight = move |sample: &Sample<Polynomial>| if sample.t < half { 100.0 } else { 0.25 };
+    let problem = fit.weighting(weight).problem().unwrap();
+    let estimate = problem.run().unwrap();
+    let found = bootstrap(&problem, &estimate, Resampling::Residuals, 400, 1).unwrap();
+    for (i, unknown) in estimate.unknowns.iter().enumerate() {
+        let error = unknown.knowledge.standard_error().unwrap();
+        // Of 400 to 3.5 %, and the sandwich of 80 measurements, of which half count, to some 15 %.
+        assert!((found.standard_errors[i] / error - 1.0).abs() < 0.5, "{found:?} {error}");
     }
 }
 

@@ -2,7 +2,7 @@
 
 use crate::pages::{Branch, Lag, Response, record};
 use crate::random::Random;
-use greybox::diagnose::{bands, identifiability};
+use greybox::diagnose::{Resampling, bands, bootstrap, identifiability};
 use greybox::{
     Experiment, ExperimentOf, Fit, Kalman, Kind, Knowledge, Model, Parameter, Report, Scalar, Severity, Time, fixed,
     free, signals,
@@ -133,6 +133,42 @@ fn the_band_of_a_filter_is_its_own() {
     assert!(widths[1] > 1.3 * widths[0], "less is known where less is measured: {widths:?}");
     let said = Report::new(&problem, &estimate).unwrap().to_markdown();
     assert!(!said.contains("moves no output"), "{said}");
+}
+
+/// A simulation does not use the noise of the model, and says so of its levels; noise that is asked for beside a filter is left out, which is
+/// said, too. Records of resampled prediction errors are not those of a disturbed plant: no bootstrap is made of them.
+#[test]
+fn noise_that_a_prediction_does_not_use() {
+    let record = drifting();
+    let start = || Unsteady { decay: free(0.7), drift: free(0.5), noise: free(0.5) };
+    let problem = Fit::new(&Drifting, &record).parameters(start()).problem().unwrap();
+    let simulated = problem.run().unwrap();
+    let advised = identifiability(&problem, &simulated).unwrap().advice;
+    for name in ["drift", "noise"] {
+        let said = format!("`{name}` stands in the noise of the model alone");
+        assert!(simulated.warnings.iter().any(|warning| warning.text.contains(&said)), "{simulated}");
+        assert!(advised.iter().any(|advice| advice.contains(&said)), "{advised:?}");
+    }
+    // Not counted among what no record can tell.
+    assert!(!advised.iter().any(|advice| advice.contains("have rank")), "{advised:?}");
+
+    let fit = || Fit::new(&Drifting, &record).parameters(start()).predictor(Kalman);
+    let said = |found: &greybox::Summary| {
+        found.warnings.iter().any(|warning| warning.text.contains("noise that was asked for"))
+    };
+    let (plain, asked) = (fit().problem().unwrap(), fit().noise(Sensor { y: 1.0 }).problem().unwrap());
+    let (found, beside) = (plain.run().unwrap(), asked.run().unwrap());
+    assert_eq!(
+        found.unknowns.iter().map(|u| u.value).collect::<Vec<_>>(),
+        beside.unknowns.iter().map(|u| u.value).collect::<Vec<_>>()
+    );
+    assert_eq!([said(&found), said(&beside)], [false, true], "{beside}");
+
+    let error = bootstrap(&plain, &found, Resampling::Residuals, 20, 1).unwrap_err().to_string();
+    assert!(
+        error.contains("Kalman filter takes in the measurements") && error.contains("diagnose::profile"),
+        "{error}"
+    );
 }
 
 /// What a parameter moves in two equal records is the root of two times what it moves in one, also through the variance.

@@ -4,7 +4,7 @@
 use crate::common::Noise;
 use argmin::core::{CostFunction, Gradient};
 use core::f64::consts::TAU;
-use greybox::estimate::NoiseModel;
+use greybox::estimate::{CovarianceMethod, NoiseModel};
 use greybox::optimize::JacobianColumns;
 use greybox::optimize::{LevenbergMarquardt, Stop};
 use greybox::*;
@@ -601,8 +601,18 @@ fn noise_levels_under_a_robust_loss() {
     let record = Experiment::new(&RandomWalk, time, vec![Push { u: 0.0 }; 4_000], outputs).unwrap();
     let record = record.initial(Position { x: fixed(0.0) });
     let start = Levels { drift: free(0.2), y: free(0.2), z: free(0.3) };
-    let fit = Fit::new(&RandomWalk, &record).parameters(Levels::map(start, Parameter::log)).predictor(Kalman);
-    let fit = fit.loss(Huber(1.345)).run().unwrap();
+    let fit = || Fit::new(&RandomWalk, &record).parameters(Levels::map(start, Parameter::log)).predictor(Kalman);
+    let plain = fit().run().unwrap();
+    // A limit that no error reaches, and weights of one: the sandwich knows variances to a part of sqrt(14 / 4000), standard errors to 3 %.
+    for same in [fit().loss(Huber(100.0)), fit().weighting(|_: &Sample<RandomWalk>| 1.0)] {
+        let same = same.run().unwrap();
+        assert_eq!(same.method.covariance, CovarianceMethod::Sandwich, "{same}");
+        for (robust, classical) in same.unknowns.iter().zip(&plain.unknowns) {
+            let ratio = [robust, classical].map(|unknown| unknown.knowledge.standard_error().unwrap());
+            assert!((ratio[0] / ratio[1] - 1.0).abs() < 0.12, "{ratio:?}: {same}");
+        }
+    }
+    let fit = fit().loss(Huber(1.345)).run().unwrap();
     for (found, truth) in [(fit.parameters.y, truth.y), (fit.parameters.z, truth.z)] {
         // Four deviations.
         assert!((found / truth - 1.0).abs() < 0.05, "{found} for {truth}: {fit}");

@@ -232,6 +232,74 @@ fn plants_that_have_no_state_of_rest() {
     assert!(nowhere.contains("of state `x`"), "{nowhere}");
 }
 
+signals! { struct Level { h: "m" } }
+signals! { struct Inflow { q: "m^3/s" } }
+signals! { struct Tank { a: "m^2", c: "m^2.5/s" } }
+
+/// `a dh/dt = q - c sqrt(max(h, 0))`: below zero no rate depends on the level.
+#[derive(Clone)]
+struct Guarded;
+
+impl Model for Guarded {
+    type State = Level;
+    type Input = Inflow;
+    type Output = Level;
+    type Parameters = Tank;
+
+    fn derivative<S: Scalar>(&self, _t: S, x: &Level<S>, u: &Inflow<S>, p: &Tank<S>) -> Level<S> {
+        Level { h: (u.q - p.c * x.h.max(S::from(0.0)).sqrt()) / p.a }
+    }
+
+    fn output<S: Scalar>(&self, _t: S, x: &Level<S>, _u: &Inflow<S>, _p: &Tank<S>) -> Level<S> {
+        *x
+    }
+}
+
+/// Newton's first step from the measured level, 0.36 m, at an outflow three times too large leads to -0.12 m, beyond the guard; the level of rest is
+/// `(q / c)^2`. The outflow comes back to what the step of the integrator leaves.
+#[test]
+fn rest_beside_a_guard() {
+    let (time, truth) = (Time::Uniform { start: 0.0, step: 2.0 }, Tank { a: 0.02, c: 5e-4 });
+    let inputs: Vec<Inflow> = (0..200).map(|k| Inflow { q: if k < 50 { 3e-4 } else { 4e-4 } }).collect();
+    let run = simulate(&Guarded, &truth, &Level { h: 0.36 }, time, &inputs).unwrap();
+    let record = run.experiment(&Guarded).unwrap().initially_at_rest();
+    for factor in [0.1, 3.0, 30.0] {
+        let start = Tank { a: free(0.03), c: free(factor * truth.c) };
+        let found = Fit::new(&Guarded, &record).parameters(start).run().unwrap();
+        assert!((found.parameters.c / truth.c - 1.0).abs() < 1e-8, "{factor}: {found}");
+        assert!((found.experiments[0].initial_state.h / 0.36 - 1.0).abs() < 1e-8, "{factor}: {found}");
+    }
+}
+
+/// An oscillator of 4 s sampled at 0.8 s and at 40 s: one step of Runge and Kutta per sample is far off, or diverges. A simulation of equations
+/// without an integrator is as good as finer steps are; one that was chosen is what was chosen.
+#[test]
+fn simulations_of_equations_take_steps_that_are_fine_enough() {
+    let model = Oscillator { says: true };
+    let equations = equations::Equations::trace(&model).unwrap();
+    let none: [greybox::record::Record; 0] = [];
+    let [c, d, b] = [2.0, 0.4, 0.5];
+    let parameters = [c, d, b, 0.1, 0.1].map(fixed).to_vec();
+    for step in [0.8, 40.0] {
+        let inputs: Vec<Force> = (0..30).map(|k| Force { f: f64::from(k % 3) }).collect();
+        let outputs = vec![Position { x: 0.0 }; 30];
+        let time = Time::Uniform { start: 0.0, step };
+        let record = Experiment::new(&model, time, inputs, outputs).unwrap();
+        let fit = || Fit::new(&equations, &none).parameters(parameters.clone());
+        let of = |fit: Fit<'_, equations::Equations>| -> Vec<f64> {
+            fit.simulate(&[0.5, 0.0], record.record()).unwrap().outputs()[0].values.to_vec()
+        };
+        let exact = of(fit().integrator(Rk45 { relative: 1e-12, ..Rk45::default() }));
+        let farthest = |found: &[f64]| found.iter().zip(&exact).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        // The finer one of two that differ by 1e-6.
+        assert!(farthest(&of(fit())) < 1e-6, "{step}: {}", farthest(&of(fit())));
+        if step < 1.0 {
+            let one = farthest(&of(fit().integrator(Rk4 { substeps: 1 })));
+            assert!(one > 1e-3, "{one}");
+        }
+    }
+}
+
 /// A simulation of equations begins where the model or the record says it, at zero where neither does.
 #[test]
 fn simulations_begin_as_the_model_says() {

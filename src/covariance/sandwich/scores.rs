@@ -13,6 +13,7 @@ use crate::covariance::shares::Shares;
 use crate::information::Gathering;
 use crate::problem::{Accumulate, Objective};
 use crate::sweep::Window;
+use core::f64::consts::FRAC_1_SQRT_2;
 use nalgebra::DMatrix;
 
 /// Part of a prediction's variance that is added to the square of the error. An interval of an unknown that one measurement alone
@@ -30,6 +31,8 @@ pub(crate) struct Scores<'s> {
     pub shares: Shares,
     /// Variance of all errors times the roots of their weights.
     noise: f64,
+    /// The root of the curvature along the logarithm of a variance relative to that along a mean.
+    variance: f64,
     pub scores: Gathering,
     row: Vec<f64>,
     /// By what the errors of a sample move each unknown; the second less the part of them that is certain.
@@ -40,11 +43,26 @@ pub(crate) struct Scores<'s> {
 
 impl<'s> Scores<'s> {
     /// By the inverse of the curvature of the experiment's unknowns.
-    pub fn new(objective: &'s Objective<'s>, experiment: usize, inverse: DMatrix<f64>, noise: f64) -> Self {
+    pub fn new(
+        objective: &'s Objective<'s>,
+        experiment: usize,
+        inverse: DMatrix<f64>,
+        noise: f64,
+        variance: f64,
+    ) -> Self {
         let columns = inverse.nrows();
         let none = || vec![[0.0; 2]; columns];
         let (shares, scores, row) = (Shares::new(experiment, inverse), Gathering::new(columns), vec![0.0; columns]);
-        Scores { objective, experiment, shares, noise, scores, row, moves: none(), variances: none() }
+        Scores { objective, experiment, shares, noise, variance, scores, row, moves: none(), variances: none() }
+    }
+
+    /// Adds the score of these slopes by an influence, and what it moves the unknowns by, of which the part `certain` is not.
+    fn add_score(&mut self, slopes: &[f64], influence: f64, certain: f64) {
+        self.row.iter_mut().zip(slopes).for_each(|(row, slope)| *row += slope * influence);
+        for ([move_by, uncertain], moved) in self.moves.iter_mut().zip(self.shares.moved()) {
+            *move_by += moved * influence;
+            *uncertain += moved * influence * certain;
+        }
     }
 }
 
@@ -58,17 +76,22 @@ impl Accumulate for Scores<'_> {
             self.row.fill(0.0);
             self.moves.fill([0.0; 2]);
             for j in (0..window.outputs()).filter(|&j| weight > 0.0 && window.is_measured(k, j, lane)) {
-                let values = window.row(k, j).iter().skip(lane).step_by(lanes);
-                slopes.iter_mut().zip(values).for_each(|(to, from)| *to = *from);
+                let take = |row: &[f64], slopes: &mut [f64]| {
+                    slopes.iter_mut().zip(row.iter().skip(lane).step_by(lanes)).for_each(|(to, from)| *to = *from);
+                };
                 let z = window.error(k, j, lane);
+                let psi = loss.map_or(z, |loss| loss.psi(z));
+                if window.has_variances() {
+                    take(window.variance_row(k, j), &mut slopes);
+                    let leverage = weight * self.variance * self.variance * self.shares.move_by(&slopes);
+                    let less = (1.0 - leverage).max(LEAST);
+                    let second = weight * (psi * z - self.objective.problem.kappa) * FRAC_1_SQRT_2;
+                    self.add_score(&slopes, second / less, less.sqrt());
+                }
+                take(window.row(k, j), &mut slopes);
                 let leverage = self.shares.take(weight, &slopes, z, (j, sample));
                 let less = (1.0 - leverage).max(LEAST);
-                let influence = weight * loss.map_or(z, |loss| loss.psi(z)) / less;
-                self.row.iter_mut().zip(&slopes).for_each(|(row, slope)| *row += slope * influence);
-                for ([move_by, uncertain], moved) in self.moves.iter_mut().zip(self.shares.moved()) {
-                    *move_by += moved * influence;
-                    *uncertain += moved * influence * less.sqrt();
-                }
+                self.add_score(&slopes, weight * psi / less, less.sqrt());
                 let canceled = (CANCELED * weight * self.noise * leverage / less).sqrt();
                 slopes.iter_mut().for_each(|slope| *slope *= canceled);
                 self.scores.take(&slopes, 0.0);

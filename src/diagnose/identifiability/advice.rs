@@ -17,15 +17,17 @@ const ONCE: f64 = 0.9;
 /// Sets that are put into words; the strongest come first.
 const MENTIONED: usize = 3;
 
-/// The sets of unknowns of the directions `warned` are left out.
+/// The sets of unknowns of the directions `warned` are left out; `levels` are parameters that stand in the noise of the model alone, which the
+/// predictions do not use.
 pub(super) fn advice(
     found: &Identifiability,
-    warned: &[Direction],
+    (warned, levels): (&[Direction], &[usize]),
     unknowns: &[Unknown],
     time_unit: &TimeUnit,
 ) -> Vec<String> {
     let mut advice = vec![];
-    let n = unknowns.len() as u64;
+    let is_level = |unknown: &Unknown| matches!(unknown.role, Role::Parameter(p) if levels.contains(&p));
+    let n = unknowns.iter().filter(|unknown| !is_level(unknown)).count() as u64;
     if found.generic_rank < n {
         advice.push(format!(
             "wherever the parameters lie, the sensitivities to the {n} unknowns have rank {}: with these inputs and outputs no \
@@ -48,10 +50,15 @@ pub(super) fn advice(
     if let Some(more @ 1..) = found.collinear.len().checked_sub(MENTIONED) {
         advice.push(format!("{} of unknowns are hardly known but together", counted(more as u64, "more set")));
     }
-    for excited in &found.excitation {
-        if excited.segments.iter().all(|segment| segment.share == 0.0) {
-            advice
-                .push(format!("`{}` moves no output by a slope: fix it, unless it stands in conditions", excited.name));
+    for (excited, unknown) in found.excitation.iter().zip(unknowns) {
+        let name = &excited.name;
+        if is_level(unknown) {
+            advice.push(format!(
+                "`{name}` stands in the noise of the model alone (Model::noise, Model::diffusion), which this prediction does not use: take Kalman, \
+                 or fix it"
+            ));
+        } else if excited.segments.iter().all(|segment| segment.share == 0.0) {
+            advice.push(format!("`{name}` moves no output by a slope: fix it, unless it stands in conditions"));
         }
     }
     // The beginning of a record is where initial states are seen, and nothing helps that.
@@ -152,10 +159,10 @@ mod tests {
         // A direction of the same unknowns, in any order, takes the sets' place; one of others does not.
         let direction =
             |names: &[&str]| Direction { moves: names.iter().map(|name| ((*name).to_owned(), 1.0)).collect() };
-        let left = |names: &[&str]| advice(&found, &[direction(names)], &unknowns, &TimeUnit::default()).len();
-        let all = advice(&found, &[], &unknowns, &TimeUnit::default()).len();
+        let left = |names: &[&str]| advice(&found, (&[direction(names)], &[]), &unknowns, &TimeUnit::default()).len();
+        let all = advice(&found, (&[], &[]), &unknowns, &TimeUnit::default()).len();
         assert_eq!([left(&["a"]), left(&["a", "c"]), left(&["b", "a"])], [all, all, all - sets.min(MENTIONED)]);
-        advice(&found, &[], &unknowns, &TimeUnit::default())
+        advice(&found, (&[], &[]), &unknowns, &TimeUnit::default())
     }
 
     const EVEN: [f64; 4] = [0.25; 4];

@@ -59,11 +59,17 @@ fn kinked(evidence: &Evidence<'_>, unknowns: &[Unknown], covariances: &Covarianc
     Some(with_care(WarningCode::CurvedInterval, text).about(About::Unknown(place.unknown)))
 }
 
-/// What conditions have to do with an unknown that has no slope: `None` where no condition depends on it, or none of a model that is not read
-/// as a graph was found to.
+/// Why an unknown has no slope that stands in the noise or in conditions of the model: `None` where it stands elsewhere, or no condition of a model
+/// that is not read as a graph was found to depend on it.
 pub(crate) fn without_slope(evidence: &Evidence<'_>, i: usize) -> Option<&'static str> {
     let objective = evidence.point.objective;
     let Role::Parameter(p) = objective.problem.unknowns.row[i].role else { return None };
+    if evidence.point.norms[i] == 0.0 && objective.sweep.levels().contains(&p) && !objective.sweep.predicts_variance() {
+        return Some(
+            "stands in the noise of the model alone (Model::noise, Model::diffusion), which this prediction does not use: take Kalman, which \
+             does, or fix it",
+        );
+    }
     let choosing = objective.sweep.choosing();
     if evidence.point.norms[i] != 0.0 || choosing.is_some_and(|choosing| !choosing.contains(&p)) {
         return None;

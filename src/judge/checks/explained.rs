@@ -108,10 +108,17 @@ fn unexplained(evidence: &Evidence<'_>) -> Vec<Warning> {
     warnings
 }
 
-/// Noise that was given, and errors of another size.
+/// Noise that was given, and errors of another size; noise that a predictor of variances leaves out.
 fn given_noise(evidence: &Evidence<'_>, method: CovarianceMethod) -> Vec<Warning> {
+    let left_out = evidence.point.objective.problem.leaves_noise_out.then(|| {
+        let text = format!(
+            "noise that was asked for is left out: {} predicts the variance of each error by the noise of the model (Model::noise)",
+            evidence.point.objective.sweep.predictor()
+        );
+        note(WarningCode::GivenNoise, text)
+    });
     if evidence.point.objective.problem.settings.prefilter.is_some() || evidence.point.objective.is_weighted() {
-        return vec![];
+        return left_out.into_iter().collect();
     }
     let outputs = evidence.point.objective.problem.layout().outputs.iter().enumerate();
     let one = |(j, output): (usize, &crate::layout::Quantity)| {
@@ -141,7 +148,7 @@ fn given_noise(evidence: &Evidence<'_>, method: CovarianceMethod) -> Vec<Warning
         );
         Some(Warning::new(WarningCode::GivenNoise, severity, text).about(About::Output(j)))
     };
-    outputs.filter_map(one).collect()
+    outputs.filter_map(one).chain(left_out).collect()
 }
 
 /// Probability that so many unknowns leave at most this part of the squares of as many independent errors about their mean

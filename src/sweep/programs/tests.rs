@@ -3,7 +3,6 @@ mod late;
 
 use super::*;
 use crate::functions::Handle;
-use crate::graph::choices;
 use crate::integrate::{Method, Rk4, automatic, exact};
 use crate::model::Model;
 use crate::predict::{FreeRun, Horizon, InitialCovariance, Kalman, Predictor};
@@ -99,7 +98,7 @@ fn sweeps<M: Model>(model: &M, predictor: impl Predictor, method: Arc<dyn Method
     let equations = Arc::new(Equations::trace(model).unwrap());
     let duals = |code| -> Arc<dyn Sweep + '_> {
         let (layout, method, predictor) = (Arc::new(Layout::of::<M>()), method.clone(), predictor.clone());
-        let uncompiled = Uncompiled { reason: String::new(), choices: Some(choices(equations.graph())) };
+        let uncompiled = Uncompiled::of(&equations, String::new());
         Arc::new(DualSweep { layout, code, method, predictor, uncompiled })
     };
     let evaluated = duals(Arc::new(Evaluated::new(equations.clone())));
