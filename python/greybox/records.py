@@ -127,9 +127,7 @@ def _in_python(text: str) -> str:
         (r'DataFile::unit\("([^"]+)", ("[^"]+")\), which', r"a frame in which `\1` is converted from \2, which"),
         (r', which converts it, or DataFile::factor\("[^"]+", 1\) if', r", or a frame as it stands if"),
         (r'give DataFile::factor\("[^"]+", 1\) if', r"give a frame as it stands if"),
-        (r"DataFile::column", 'columns={"signal": "column"}, or time="column"'),
-        (r"DataFile::sample_time", "sample_time"),
-        (r"DataFile::(\w+)", r"pandas.read_csv (here is no option \1)"),
+        (r'give DataFile::factor\("([^"]+)", \.\.\)', r"give a frame in which `\1` is converted"),
     ):
         text = re.sub(theirs, ours, text)
     return text
