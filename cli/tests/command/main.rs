@@ -463,30 +463,31 @@ fn each_record_has_its_own_parameter() {
         .filter_map(|line| line.split_whitespace().find_map(|word| word.parse().ok().filter(|fit| *fit > 1.0)))
         .collect();
     assert!(fits.len() == 2 && fits.iter().all(|fit| *fit > 95.0), "{out}");
-    // Of two records of one name each has its own, too; one that was not fitted has none, and is left out.
+    // Of two records of one name each has its own, too.
     for name in ["slow", "fast"] {
         std::fs::create_dir(bench.path(name)).unwrap();
         std::fs::copy(bench.path(&format!("{name}.csv")), bench.path(&format!("{name}/run.csv"))).unwrap();
     }
-    let twins = [
-        "compare",
-        "--model",
-        "lag.toml",
-        "--per-record",
-        "p",
-        "slow/run.csv",
-        "fast/run.csv",
-        "--validation",
-        "slow.csv",
-    ];
-    let Output { stdout, stderr, .. } = bench.run(&twins);
-    let [out, remarks] = [stdout, stderr].map(|text| String::from_utf8(text).unwrap());
-    let percents = out
-        .lines()
-        .filter(|line| line.contains("estimation"))
-        .filter_map(|line| line.split_whitespace().find_map(|word| word.parse::<f64>().ok().filter(|fit| *fit > 1.0)));
-    assert!(percents.filter(|fit| *fit > 95.0).count() == 2, "{out}");
-    assert!(remarks.contains("slow.csv is left out") && !out.contains("validation"), "{remarks} {out}");
+    let twins = ["lag.toml", "--per-record", "p", "slow/run.csv", "fast/run.csv"];
+    bench.run(&[&["fit", "--json", "twins.json"], &twins[..]].concat());
+    let stored = ["lag.toml:twins.json", "--per-record", "p", "slow/run.csv", "fast/run.csv"];
+    for (words, is_stored) in [(&twins[..], false), (&stored[..], true)] {
+        let Output { stdout, stderr, .. } = bench.run(&[&["compare", "--model"], words].concat());
+        let [out, remarks] = [stdout, stderr].map(|text| String::from_utf8(text).unwrap());
+        let percents =
+            out.lines().filter(|line| line.contains("estimation") && line.contains("run #")).filter_map(|line| {
+                line.split_whitespace().find_map(|one| one.parse::<f64>().ok().filter(|fit| *fit > 1.0))
+            });
+        assert!(percents.filter(|fit| *fit > 95.0).count() == 2, "{out}");
+        let places = "slow/run.csv of `run #1`, fast/run.csv of `run #2`";
+        assert!(remarks.contains(places) == is_stored, "{remarks}");
+        // One that was not fitted has none, whatever its name.
+        for other in ["slow.csv", "slow/run.csv"] {
+            let words = [&["compare", "-q", "--model"], words, &["--validation", other]].concat();
+            let (_, error) = bench.ends(1, &words);
+            assert!(error.contains(&format!("error: {other}: parameter `p` of lag.toml")), "{error}");
+        }
+    }
     let last = |words: &[&str]| {
         let (out, _) = bench.ends(0, words);
         out.lines().nth(22).unwrap().rsplit(',').next().unwrap().parse::<f64>().unwrap()
