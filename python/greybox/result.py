@@ -11,7 +11,7 @@ import numpy as np
 
 from greybox import _core
 from greybox.bootstrap import Bootstrap
-from greybox.errors import Error
+from greybox.errors import Error, FitWarning, warn
 from greybox.estimate import Estimate
 from greybox.frames import Array, Kind
 from greybox.model import Equations
@@ -227,12 +227,21 @@ class Fit(Estimate):
         ------
         Error
             If blocks are longer than half of a record, or fewer than twenty refits ended.
+
+        Warns
+        -----
+        FitWarning
+            If the time limit of the fit ended it after fewer refits. Ctrl-C ends it without a result.
         """
         count, seed = whole("count", count, 1), whole("seed", seed, 0)
         blocks = None if blocks is None else whole("blocks", blocks, 0)
         with Progress(progress, "bootstrap", count) as shown:
             found = self._problem.bootstrap(self._estimate, blocks, count, seed, shown)
-        return Bootstrap(self.unknowns, [row[2] for row in self._estimate.unknowns], count, seed, self._kind, found)
+        made = Bootstrap(self.unknowns, [row[2] for row in self._estimate.unknowns], seed, self._kind, found)
+        if made.tried < count:
+            text = f"the time limit ended the bootstrap after {made.tried} of {count} refits: the intervals are of these"
+            warn(FitWarning("bootstrap_ended", "usable", text))
+        return made
 
     def report(
         self,
