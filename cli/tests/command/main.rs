@@ -520,3 +520,38 @@ fn a_simulation_begins_at_the_first_sample() {
     let (_, error) = bench.ends(1, &["simulate", "pmsm.toml", "inputs.csv", "--initial", "first"]);
     assert!(error.contains("no column `id`"), "{error}");
 }
+
+/// Its state at the first sample is of the fit's record of its name alone; any other begins as the model says.
+#[test]
+fn a_record_of_another_name_begins_as_the_model_says() {
+    let bench = Bench::new();
+    let model = "greybox = 1\n[inputs]\nroom = \"degC\"\n[parameters]\nk = { unit = \"1/s\", start = 1.0 }\n[states]\n\
+                 body = { unit = \"degC\", derivative = \"k*(room - body)\", initial = \"first\" }\n[outputs]\nbody = \"body\"\n";
+    std::fs::write(bench.path("cooling.toml"), model).unwrap();
+    for (name, start) in [("warm", 80.0), ("cold", 5.0)] {
+        let row = |k: i32| {
+            let t = 0.1 * f64::from(k);
+            format!("{t},20,{}\n", 20.0 + (start - 20.0) * (-0.5 * t).exp() + 0.01 * f64::from(k * 37 % 21 - 10))
+        };
+        let rows: String = (0..100).map(row).collect();
+        std::fs::write(bench.path(&format!("{name}.csv")), format!("t,room,body\n{rows}")).unwrap();
+    }
+    bench.run(&["fit", "cooling.toml", "warm.csv", "--json", "e.json"]);
+    let begins = |words: &[&str]| {
+        let (out, remarks) = bench.ends(0, &[&["simulate", "cooling.toml"], words].concat());
+        let cell = out.lines().nth(1).unwrap().rsplit(',').next().unwrap().parse::<f64>().unwrap();
+        (cell, remarks)
+    };
+    // The measured ones are off by 0.1 degC at the first sample.
+    let (warm, remarks) = begins(&["warm.csv", "--estimate", "e.json"]);
+    assert!(
+        (warm - 80.0).abs() < 0.2 && remarks.contains("record `warm` of the estimate begins at body = "),
+        "{remarks}"
+    );
+    let (cold, remarks) = begins(&["cold.csv", "--estimate", "e.json"]);
+    assert!((cold - 5.0).abs() < 0.2 && remarks.contains("as the model says, or from zero"), "{cold} {remarks}");
+    let (_, remarks) = begins(&["cold.csv"]);
+    assert!(remarks.contains("the values of k are the starts of a fit"), "{remarks}");
+    let (zero, remarks) = begins(&["cold.csv", "--initial", "body=0", "--fix", "k=0.5"]);
+    assert!(zero == 0.0 && !remarks.contains("starts") && !remarks.contains("record begins"), "{remarks}");
+}
