@@ -58,7 +58,7 @@ class Record:
     Raises
     ------
     Error
-        If both `time` and `sample_time` are given.
+        If two of `time`, `sample_time` and `columns` of ``t`` are given.
     """
 
     data: Any
@@ -72,6 +72,11 @@ class Record:
     def __post_init__(self) -> None:
         if self.time is not None and self.sample_time is not None:
             raise Error(f"time={self.time!r} and sample_time={self.sample_time!r} both give the time of the samples; leave one out")
+        if isinstance(self.columns, Mapping) and "t" in self.columns:
+            for name, given in (("time", self.time), ("sample_time", self.sample_time)):
+                if given is not None:
+                    both = f"columns={{'t': {self.columns['t']!r}}} and {name}={given!r}"
+                    raise Error(f"{both} both give the time of the samples; leave one out")
 
     def core(self, equations: Equations, name: str, *, outputs: bool = True) -> _core.Record:
         """Give the record as the library takes it. Without `outputs`, those that the frame lacks are missing measurements."""
