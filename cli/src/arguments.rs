@@ -318,7 +318,9 @@ pub struct Bootstrap {
     pub seed: u64,
 }
 
+// What has no meaning where each record is fitted by itself is refused, and not offered.
 #[derive(Args)]
+#[command(mut_arg("per_record", |option| option.hide(true)), mut_arg("checkpoint", |option| option.hide(true)))]
 pub struct Fleet {
     /// A model file, or the name of a model that ships.
     pub model: Option<String>,

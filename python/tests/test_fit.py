@@ -174,6 +174,8 @@ WRONG: list[tuple[dict[str, Any], str]] = [
     ({"k": gb.free(1.0), "initial": {"bdy": gb.fixed(80.0)}}, "there is no initial state of `bdy`"),
     ({"k": gb.free(1.0), "noise": {"bdy": 0.1}}, "noise names `bdy`"),
     ({"k": gb.free(1.0), "noise": "full"}, "covariance"),
+    ({"k": gb.free(1.0), "noise": "covariance", "predictor": "kalman"}, "noise='covariance' has no effect on the predictor kalman"),
+    ({"k": gb.free(1.0), "noise": {"body": 0.1}, "predictor": "second-order:stationary"}, "no effect on the predictor second-order"),
     ({"k": gb.free(1.0), "time": "t", "sample_time": 0.1}, "time='t' and sample_time=0.1 both give the time of the samples; leave one out"),
     ({"k": gb.free(1.0), "columns": {"t": "t"}, "sample_time": 0.1}, "columns={'t': 't'} and sample_time=0.1 both give the time"),
     ({"k": gb.free(1.0), "columns": {"t": "t"}, "time": "t"}, "columns={'t': 't'} and time='t' both give the time"),

@@ -386,6 +386,16 @@ fn options_without_a_meaning_are_refused() {
         let error = simulate(option, value);
         assert!(error.contains("it has no meaning here; it is an option of fit, compare, "), "{error}");
     }
+    for (option, value) in [("--noise", &["id=1"][..]), ("--noise-covariance", &[])] {
+        let words = [&["fit", "pmsm.toml", "record.csv", "--predictor", "kalman", option], value].concat();
+        let (_, error) = bench.ends(1, &words);
+        let says = format!("{} has no effect on the predictor kalman, a filter", [&[option], value].concat().join(" "));
+        assert!(error.contains(&says), "{error}");
+    }
+    let (_, error) = bench.ends(1, &["fleet", "pmsm.toml", "record.csv", "--per-record", "rs"]);
+    assert!(error.contains("--per-record rs: each record of a fleet is fitted by itself"), "{error}");
+    let (help, _) = bench.ends(0, &["fleet", "--help"]);
+    assert!(!help.contains("--per-record") && !help.contains("--checkpoint") && help.contains("--prior"), "{help}");
     assert!(simulate("--noise", "id=-1").contains("-1 is no standard deviation; give a positive number, or 0"));
     let timed = |option: &str, value: &str| {
         let words = ["check", "pmsm.toml", "record.csv", "--sample-time", "5e-4", option, value];
