@@ -178,8 +178,11 @@ fn files_that_cannot_be_written_are_named_at_once() {
         assert!(out.is_empty() && error.starts_with("error: nowhere/r.html: there is no such folder"), "{error}");
     }
     for command in ["simulate", "convert"] {
-        let (_, error) = bench.ends(1, &[command, "pmsm.toml", "record.csv", "--out", "made.txt"]);
-        assert!(error.starts_with("error: made.txt: ") && error.contains("take .csv or .json"), "{error}");
+        for (file, ending) in [("made.txt", ".txt"), ("made.json", ".json")] {
+            let (_, error) = bench.ends(1, &[command, "pmsm.toml", "record.csv", "--out", file]);
+            let says = format!("error: {file}: files that end in {ending} are not written; take .csv");
+            assert!(error.starts_with(&says), "{error}");
+        }
     }
 }
 
