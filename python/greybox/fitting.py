@@ -172,7 +172,7 @@ def simulate(
     parameters: Mapping[str, float],
     initial: Mapping[str, float] | None = None,
     noise: Mapping[str, float] | None = None,
-    seed: int = 0,
+    seed: int = 1,
     time: str | None = None,
     sample_time: float | None = None,
     columns: Mapping[str, str] | None = None,

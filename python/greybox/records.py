@@ -39,7 +39,7 @@ class Record:
         structured array. A row for each sample; further columns are ignored. Or the path of a file: of text with columns (``.csv``), in
         which what is not said is found, or of a kind that :func:`greybox.read` reads.
     name : str, optional
-        The name in reports and errors; that of the file without it.
+        The name in reports and errors; without it that of the file, without its ending.
     time : str, optional
         The column of the time: seconds, or dates, which count from the first. Without it, the column ``t`` or ``time``, or else the
         index of a pandas frame.
@@ -81,7 +81,7 @@ class Record:
     def core(self, equations: Equations, name: str, *, outputs: bool = True) -> _core.Record:
         """Give the record as the library takes it. Without `outputs`, those that the frame lacks are missing measurements."""
         inputs, measured = named(equations.inputs, "inputs"), named(equations.outputs, "outputs")
-        data, name = opened(self.data), self.name or (Path(self.data).name if is_path(self.data) else name)
+        data, name = opened(self.data), self.name or (Path(self.data).stem if is_path(self.data) else name)
         if isinstance(data, Path):
             columns_ = {**(self.columns or {}), **({} if self.time is None else {"t": self.time})}
             try:

@@ -87,7 +87,7 @@ def test_several_files_and_what_is_said_of_each(tmp_path: Path) -> None:
         pd.DataFrame(cooled(k=k)).rename(columns={"t": "when", "body": "T"}).to_csv(tmp_path / f"{name}.csv", index=False, sep=";", decimal=",")
     paths = [tmp_path / "cold.csv", tmp_path / "warm.csv"]
     found = gb.fit(cooling(), paths, k=gb.free(1.0, per_experiment=True), time="when", columns={"body": "T"})
-    assert [one["name"] for one in found.to_dict()["experiments"]] == ["cold.csv", "warm.csv"]
+    assert [one["name"] for one in found.to_dict()["experiments"]] == ["cold", "warm"]
     assert found.parameters.k == pytest.approx(0.3, rel=0.01)
     with pytest.raises(gb.Error, match="no column `body`; the file has: when, room, T; name another with columns="):
         gb.fit(cooling(), paths[0], k=gb.free(1.0), time="when")
@@ -102,7 +102,7 @@ def test_files_of_one_name_in_two_folders_are_two_records(kind: str, tmp_path: P
         path.parent.mkdir()
         FILES[kind](path, cooled(k=k))
     found = gb.fit(cooling(), paths, k=gb.free(1.0, per_experiment=True))
-    names = [f"run.{kind} #1", f"run.{kind} #2"]
+    names = ["run #1", "run #2"]
     assert [name for name in found.unknowns if name.startswith("k")] == [f"k [{name}]" for name in names]
     of = pd.DataFrame(found.to_dataframe())["record"]
     assert of.value_counts(sort=False).to_dict() == dict.fromkeys(names, 200)
