@@ -19,7 +19,7 @@ from greybox.model import Equations
 from greybox.parameters import Parameter, said
 from greybox.signals import Signals, named
 
-__all__ = ["Hold", "Initial", "Record", "filled", "framed", "kind_of", "opened", "records"]
+__all__ = ["Hold", "Initial", "Record", "filled", "framed", "is_path", "kind_of", "opened", "records"]
 
 #: The inputs between samples, of all or by the name of each.
 Hold: TypeAlias = "Literal['zero', 'first'] | Mapping[str, Literal['zero', 'first']]"
