@@ -43,7 +43,7 @@ pub enum Command {
     Fleet(Fleet),
     /// Check a model and records without a fit: units, columns, gaps, and which unknowns the data determine.
     Check(Check),
-    /// Write a record in another format: CSV or JSON.
+    /// Write a record as CSV: the signals of the model, in its units.
     Convert(Convert),
     /// Write a commented model file to begin with.
     New(New),
@@ -265,7 +265,7 @@ pub struct Simulate {
     /// The seed of the random numbers.
     #[arg(long, value_name = "NUMBER", default_value_t = 1)]
     pub seed: u64,
-    /// Where the record goes: .csv or .json; without it, as CSV to standard output.
+    /// Where the record goes, a .csv file; without it, to standard output.
     #[arg(short, long, value_name = "FILE")]
     pub out: Option<PathBuf>,
 }
@@ -318,7 +318,9 @@ pub struct Bootstrap {
     pub seed: u64,
 }
 
+// What has no meaning where each record is fitted by itself is refused, and not offered.
 #[derive(Args)]
+#[command(mut_arg("per_record", |option| option.hide(true)), mut_arg("checkpoint", |option| option.hide(true)))]
 pub struct Fleet {
     /// A model file, or the name of a model that ships.
     pub model: Option<String>,
@@ -360,7 +362,7 @@ pub struct Convert {
     pub records: Vec<PathBuf>,
     #[command(flatten, next_help_heading = "Records")]
     pub of_records: RecordOptions,
-    /// Where it goes: .csv or .json; without it, as CSV to standard output.
+    /// Where it goes, a .csv file; without it, to standard output.
     #[arg(short, long, value_name = "FILE")]
     pub out: Option<PathBuf>,
 }

@@ -22,13 +22,46 @@ struct Entrant {
 impl Entrant {
     /// The estimate for a record that was fitted, by its place: records may have equal names.
     fn of_record(&self, k: usize) -> Summary {
-        let (experiments, records) = (&self.estimate.experiments, &self.loaded.records);
-        let is_of = |(name, record): (&str, &Record)| {
-            name.strip_prefix(record.name()).is_some_and(|rest| rest.is_empty() || rest.starts_with(" #"))
-        };
-        let names = experiments.iter().map(|experiment| experiment.name.as_str());
-        let fitted = experiments.len() == records.len() && names.zip(records).all(is_of);
+        let fitted = labels(&self.loaded.records).eq(self.estimate.experiments.iter().map(|one| one.name.clone()));
         self.estimate.of_experiment(k).filter(|_| fitted).unwrap_or_else(|| self.estimate.clone())
+    }
+
+    /// Says whose values files of one name are given: a stored estimate has no other name of them than their places.
+    fn say_places(&self, files: &[PathBuf], terminal: &Terminal) {
+        let has_own = !self.estimate.own_parameters().is_empty();
+        let numbered = files.iter().zip(&self.estimate.experiments).zip(&self.loaded.records);
+        let numbered = numbered.filter(|((_, stored), record)| stored.name != record.name());
+        let said: Vec<String> =
+            numbered.map(|((file, stored), _)| format!("{} of `{}`", file.display(), stored.name)).collect();
+        if has_own && !said.is_empty() {
+            terminal.remark(format_args!(
+                "{}: files of one name have the values of the fit's records in their order: {}",
+                self.title,
+                said.join(", ")
+            ));
+        }
+    }
+}
+
+/// The names of records, numbered where they are equal, as those of an estimate.
+fn labels(records: &[Record]) -> impl Iterator<Item = String> {
+    let count = |all: &[Record], name: &str| all.iter().filter(|one| one.name() == name).count();
+    records.iter().enumerate().map(move |(k, record)| match record.name() {
+        name if count(records, name) > 1 => format!("{name} #{}", count(&records[..=k], name)),
+        name => name.to_owned(),
+    })
+}
+
+/// Refuses records of validation where each record of the fit has a parameter for itself: such a parameter tells nothing of another record.
+fn shared(title: &str, parameters: &[&str], validation: &[PathBuf]) -> Result<(), Failure> {
+    match (parameters, validation) {
+        ([name, ..], [path, ..]) => Err(format!(
+            "{}: parameter `{name}` of {title} has a value for each record of the fit, and a record of validation has none; \
+             leave --validation out, or have all records share `{name}`",
+            path.display()
+        )
+        .into()),
+        _ => Ok(()),
     }
 }
 
@@ -38,25 +71,22 @@ pub fn run(one: &Compare, terminal: &Terminal) -> Result<Verdict, Failure> {
     }
     output::check(one.report.as_deref(), &output::REPORTS)?;
     let (files, validation) = (expanded(&one.records)?, expanded(&one.validation)?);
-    let entrants = one.models.iter().map(|name| entrant(name, one, &files, terminal)).collect::<Result<Vec<_>, _>>()?;
+    let of_name = |name: &String| entrant(name, one, (&files, &validation), terminal);
+    let entrants = one.models.iter().map(of_name).collect::<Result<Vec<_>, _>>()?;
     let Some(first) = entrants.first() else { return Err("no model is named: --model MODEL".into()) };
     let mut compared = vec![];
-    for (k, record) in first.loaded.records.iter().enumerate() {
-        let of = |entrant: &Entrant| Ok((entrant.of_record(k), entrant.loaded.records[k].clone()));
-        compared.push(predicted(Compared::estimation(record), &entrants, of)?);
+    for (k, (record, label)) in first.loaded.records.iter().zip(labels(&first.loaded.records)).enumerate() {
+        let of = |entrant: &Entrant, _: usize| (entrant.of_record(k), entrant.loaded.records[k].clone());
+        compared.push(predicted(Compared::estimation(&record.clone().named(label)), &entrants, of)?);
     }
-    for path in &validation {
-        let read = |entrant: &Entrant| {
-            records::one(path, &entrant.loaded.model, &one.of_records, &one.of_model.values.initial, &terminal.silent())
-        };
-        let record = read(first)?;
-        // Parameters that each record has for itself tell nothing of another one.
-        if let Some(error) = entrants.iter().find_map(|entrant| entrant.estimate.of_record(&record).err()) {
-            terminal.remark(format_args!("{} is left out: {error}", path.display()));
-            continue;
-        }
-        let of = |entrant: &Entrant| Ok((entrant.estimate.clone(), read(entrant)?));
-        compared.push(predicted(Compared::validation(&record), &entrants, of)?);
+    let read = |entrant: &Entrant| {
+        let initial = &one.of_model.values.initial;
+        records::all(&validation, &entrant.loaded.model, &one.of_records, initial, &terminal.silent())
+    };
+    let others = entrants.iter().map(read).collect::<Result<Vec<_>, _>>()?;
+    for (k, (record, label)) in others[0].iter().zip(labels(&others[0])).enumerate() {
+        let of = |entrant: &Entrant, e: usize| (entrant.estimate.clone(), others[e][k].clone());
+        compared.push(predicted(Compared::validation(&record.clone().named(label)), &entrants, of)?);
     }
     let report = fit::report(&first.problem, &first.estimate, &first.loaded, &[])?;
     let mut short = Report { sections: vec![], severity: first.estimate.severity(), ..report.clone() };
@@ -77,7 +107,12 @@ pub fn run(one: &Compare, terminal: &Terminal) -> Result<Verdict, Failure> {
 }
 
 /// Reads a model, with its estimate or fitted.
-fn entrant(name: &str, one: &Compare, files: &[PathBuf], terminal: &Terminal) -> Result<Entrant, Failure> {
+fn entrant(
+    name: &str,
+    one: &Compare,
+    (files, validation): (&[PathBuf], &[PathBuf]),
+    terminal: &Terminal,
+) -> Result<Entrant, Failure> {
     let (name, stored) = match name.rsplit_once(':') {
         Some((name, stored)) if stored.ends_with(".json") => (name, Some(PathBuf::from(stored))),
         _ => (name, None),
@@ -85,37 +120,38 @@ fn entrant(name: &str, one: &Compare, files: &[PathBuf], terminal: &Terminal) ->
     let model = model(Some(name), &one.of_model.values.constant, terminal)?;
     let parameters = declared(&model, &one.of_model)?;
     let records = records::all(files, &model, &one.of_records, &one.of_model.values.initial, terminal)?;
+    let layout = model.equations().layout();
+    let own = parameters.iter().zip(&layout.parameters).filter(|(one, _)| one.per_experiment);
+    shared(name, &own.map(|(_, of)| of.name.as_str()).collect::<Vec<_>>(), validation)?;
     let loaded = Loaded { model, files: files.to_vec(), records, parameters };
     let problem = watched(&loaded, &one.of_fit, terminal)?.problem()?;
-    let estimate = match &stored {
-        Some(path) => {
-            let found = estimate(path)?;
-            if found.layout.parameters != loaded.model.equations().layout().parameters {
-                return Err(format!("{}: the estimate is of a model with other parameters", path.display()).into());
-            }
-            found
-        }
-        None => problem.run()?,
+    let Some(path) = stored else {
+        let estimate = problem.run()?;
+        return Ok(Entrant { title: name.to_owned(), loaded, problem, estimate });
     };
-    let title = match &stored {
-        Some(path) => format!("{name} ({})", path.display()),
-        None => name.to_owned(),
-    };
-    Ok(Entrant { title, loaded, problem, estimate })
+    let (estimate, title) = (estimate(&path)?, format!("{name} ({})", path.display()));
+    if estimate.layout.parameters != loaded.model.equations().layout().parameters {
+        return Err(format!("{}: the estimate is of a model with other parameters", path.display()).into());
+    }
+    let own = estimate.own_parameters().into_iter().map(|j| estimate.parameters[j].name.as_str());
+    shared(&title, &own.collect::<Vec<_>>(), validation)?;
+    let entrant = Entrant { title, loaded, problem, estimate };
+    entrant.say_places(files, terminal);
+    Ok(entrant)
 }
 
 /// A record with what each model predicts of it, by the estimate that is for it.
 fn predicted(
     compared: Compared,
     entrants: &[Entrant],
-    of: impl Fn(&Entrant) -> Result<(Summary, Record), Failure>,
+    of: impl Fn(&Entrant, usize) -> (Summary, Record),
 ) -> Result<Compared, Failure> {
-    let with = |compared: Compared, entrant: &Entrant| {
-        let (estimate, record) = of(entrant)?;
+    let with = |compared: Compared, (e, entrant): (usize, &Entrant)| {
+        let (estimate, record) = of(entrant, e);
         let prediction = entrant.problem.predict(&estimate, &record)?;
         Ok::<_, Failure>(compared.with(&entrant.title, &prediction)?)
     };
-    entrants.iter().try_fold(compared, with)
+    entrants.iter().enumerate().try_fold(compared, with)
 }
 
 /// Criteria of each model.

@@ -1,4 +1,4 @@
-//! `convert`: a record in another format.
+//! `convert`: a record as CSV.
 
 use crate::arguments::Convert;
 use crate::fitting::{expanded, model};
@@ -24,12 +24,9 @@ pub fn only(named: &[PathBuf], what: &str) -> Result<PathBuf, Failure> {
     }
 }
 
-/// Writes a record as the path's ending says, one of [`output::RECORDS`]; to standard output as CSV.
+/// Writes a record as CSV; without a path to standard output.
 pub fn write(record: &Record, path: Option<&Path>) -> Result<(), Failure> {
     match path {
-        Some(path) if output::ending(path) == "json" => {
-            output::write(Some(path), serde_json::to_string(record)?.as_bytes())
-        }
         Some(path) => Ok(record.to_csv(output::target(path))?),
         None => {
             let file = std::env::temp_dir().join(format!("greybox_{}.csv", std::process::id()));

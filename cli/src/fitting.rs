@@ -165,6 +165,7 @@ pub fn fit<'a>(
     if let Some(name) = options.predictor.as_deref().or(model.predictor()) {
         fit = fit.predictor_by_name(name)?;
     }
+    refuse_noise(options, options.predictor.as_deref().or(model.predictor()))?;
     fit = match options.noise_covariance {
         true => fit.noise_covariance(),
         false => fit.noise_by_name(pairs(&noise(model, &options.noise)?))?,
@@ -202,6 +203,21 @@ pub fn fit<'a>(
         fit = fit.checkpoint(path, 10);
     }
     Ok(fit)
+}
+
+/// Refuses noise of outputs beside a filter, which takes that of the model.
+fn refuse_noise(options: &FitOptions, predictor: Option<&str>) -> Result<(), Failure> {
+    let is_filter =
+        |name: &&str| ["kalman", "second-order"].contains(&name.split(':').next().unwrap_or_default().trim());
+    let option = match (options.noise.first(), options.noise_covariance) {
+        (Some((name, value)), _) => format!("--noise {name}={value}"),
+        (None, true) => "--noise-covariance".to_owned(),
+        (None, false) => return Ok(()),
+    };
+    predictor.filter(is_filter).map_or(Ok(()), |name| {
+        Err(format!("{option} has no effect on the predictor {name}, a filter: it takes `noise` of the model file")
+            .into())
+    })
 }
 
 /// The noise of the outputs as the model file has it, and as it was said, which goes before.

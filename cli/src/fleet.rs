@@ -20,6 +20,12 @@ use std::path::{Path, PathBuf};
 use table::Table;
 
 pub fn run(one: &Fleet, terminal: &Terminal) -> Result<Verdict, Failure> {
+    if let Some(name) = one.of_model.per_record.first() {
+        return Err(format!(
+            "--per-record {name}: each record of a fleet is fitted by itself, with all parameters its own; leave it out"
+        )
+        .into());
+    }
     let model = model(one.model.as_deref(), &one.of_model.values.constant, terminal)?;
     let layout = model.equations().layout();
     let parameters = declared(&model, &one.of_model)?;

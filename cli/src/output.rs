@@ -8,8 +8,8 @@ use std::path::{Path, PathBuf};
 
 /// What a report may be written as.
 pub const REPORTS: [&str; 4] = ["html", "md", "json", "txt"];
-/// What a record may be written as.
-pub const RECORDS: [&str; 2] = ["csv", "json"];
+/// What a record may be written as: what is read again.
+pub const RECORDS: [&str; 1] = ["csv"];
 
 /// Writes beside the file first and then renames, so that there is never half a file; without a path, to standard output.
 pub fn write(path: Option<&Path>, content: &[u8]) -> Result<(), Failure> {

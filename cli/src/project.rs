@@ -122,12 +122,13 @@ fn options(
 }
 
 /// Whether an option of a project is for another command than this one, which has an option of the same name: results are for the
-/// command that they are of, and noise is what a fit knows of its records.
+/// command that they are of, noise is what a fit knows of its records, and each record of a fleet has all for itself.
 fn is_for_another(command: &str, key: &str) -> bool {
     match key {
         "report" => command != "fit",
         "out" => command != "fleet",
         "noise" => command == "simulate",
+        "per-record" => command == "fleet",
         _ => false,
     }
 }

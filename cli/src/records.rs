@@ -129,13 +129,16 @@ fn file(path: &Path, model: &Model, layout: &Layout, options: &RecordOptions) ->
         let declared = at.and_then(|at| model.holds()[at]);
         file = file.fill(input, said.transpose()?.or(declared).unwrap_or_default());
     }
-    for (signal, column) in &options.column {
+    // What is said of outputs that are not read.
+    let is_of = |all: &Layout, signal: &str| all.outputs.iter().any(|output| output.name == signal);
+    let is_left_out = |signal: &str| is_of(model.equations().layout(), signal) && !is_of(layout, signal);
+    for (signal, column) in options.column.iter().filter(|(signal, _)| !is_left_out(signal)) {
         file = file.column(signal, column);
     }
     if let Some(column) = &options.time {
         file = file.column("t", column);
     }
-    for (signal, unit) in &options.unit {
+    for (signal, unit) in options.unit.iter().filter(|(signal, _)| !is_left_out(signal)) {
         file = in_unit(file, signal, unit, layout)?;
     }
     if let Some(unit) = &options.time_unit {

@@ -13,19 +13,21 @@ pub fn run(one: &Simulate, terminal: &Terminal) -> Result<Verdict, Failure> {
     let model = model(one.model.as_deref(), &one.of_model.constant, terminal)?;
     let layout = model.equations().layout();
     let path = convert::only(&one.records, "file with the inputs")?;
-    // Outputs need not be in the file; an estimate has an initial state.
-    let measured = one.estimate.is_none() || !one.of_model.initial.is_empty();
-    let inputs = records::inputs(&path, &model, &one.of_records, &one.of_model.initial, measured, terminal)?;
+    let stored = one.estimate.as_deref().map(estimate).transpose()?;
+    // A record of the fit begins as the fit found it, for which outputs need not be in the file.
+    let name = path.file_stem().unwrap_or_default().to_string_lossy();
+    let is_fitted = stored.iter().flat_map(|found| &found.experiments).any(|record| record.name == name);
+    let as_found = is_fitted && one.of_model.initial.is_empty();
+    let inputs = records::inputs(&path, &model, &one.of_records, &one.of_model.initial, !as_found, terminal)?;
     let options = ModelOptions { values: one.of_model.clone(), ..Default::default() };
     let mut parameters = declared(&model, &options)?;
-    let mut initial = None;
-    if let Some(path) = &one.estimate {
-        let found = estimate(path)?;
+    // What the command line sets is kept.
+    let said = |name: &str| one.of_model.set.iter().chain(&one.of_model.fix).any(|(known, _)| known == name);
+    let mut found_state = None;
+    if let (Some(found), Some(path)) = (stored, &one.estimate) {
         if found.layout.parameters != layout.parameters {
             return Err(format!("{}: the estimate is of a model with other parameters", path.display()).into());
         }
-        // What the command line sets is kept.
-        let said = |name: &str| one.of_model.set.iter().chain(&one.of_model.fix).any(|(known, _)| known == name);
         let found = match found.of_record(&inputs) {
             Err(_) if found.own_parameters().iter().all(|j| said(&found.parameters[*j].name)) => found,
             own => own?,
@@ -35,19 +37,34 @@ pub fn run(one: &Simulate, terminal: &Terminal) -> Result<Verdict, Failure> {
                 *parameter = fixed(found.value);
             }
         }
-        if let (Some(first), true) = (found.experiments.first(), one.of_model.initial.is_empty()) {
-            initial = Some(first.initial_state.clone());
-        }
+        found_state = found.experiments.first().filter(|_| as_found).map(|record| record.initial_state.clone());
+    }
+    let starts = layout.parameters.iter().zip(&parameters).filter(|(of, one)| one.free && !said(&of.name));
+    let starts: Vec<&str> = starts.map(|(of, _)| of.name.as_str()).collect();
+    if !starts.is_empty() {
+        terminal.remark(format_args!(
+            "the values of {} are the starts of a fit; --estimate, --set or --fix gives others",
+            starts.join(", ")
+        ));
     }
     let equations: &greybox::equations::Equations = model.equations();
     let mut fit = Fleet::new(equations).parameters(parameters);
     if let Some(name) = one.integrator.as_deref().or(model.integrator()) {
         fit = fit.integrator_by_name(name)?;
     }
-    let initial = match initial {
+    let initial = match found_state {
         Some(initial) => initial,
         None => fit.initial_state(&inputs)?,
     };
+    if one.of_model.initial.is_empty() && !initial.is_empty() {
+        let states = layout.states.iter().zip(&initial);
+        let states: Vec<String> = states.map(|(of, value)| format!("{} = {value}", of.name)).collect();
+        let origin = match as_found {
+            true => format!("record `{name}` of the estimate begins"),
+            false => "as the model says, or from zero, the record begins".to_owned(),
+        };
+        terminal.remark(format_args!("{origin} at {}; --initial gives another state", states.join(", ")));
+    }
     let simulated = fit.simulate(&initial, &inputs)?;
     let noise = numbers("--noise", &one.noise)?;
     let simulated = if noise.is_empty() { simulated } else { noisy(&simulated, layout, &noise, one.seed)? };

@@ -10,8 +10,8 @@ from greybox.signals import near
 
 __all__ = ["Bootstrap"]
 
-#: Standard errors, biases, intervals, refits that ended, and JSON.
-Found: TypeAlias = "tuple[list[float], list[float], list[tuple[float, float]], int, str]"
+#: Standard errors, biases, intervals, refits that were tried, those that ended, and JSON.
+Found: TypeAlias = "tuple[list[float], list[float], list[tuple[float, float]], int, int, str]"
 
 
 class Bootstrap:
@@ -22,18 +22,17 @@ class Bootstrap:
     unknowns : list of str
         The free quantities, initial states too.
     tried, converged : int
-        Refits begun, and those that ended; the others are left out.
+        Refits begun, fewer than asked for where a time limit ended them, and those that ended; the others are left out.
     seed : int
         The seed that makes the same again.
     """
 
-    def __init__(self, unknowns: list[str], values: list[float], tried: int, seed: int, kind: Kind, found: Found) -> None:
+    def __init__(self, unknowns: list[str], values: list[float], seed: int, kind: Kind, found: Found) -> None:
         self.unknowns = unknowns
-        self.tried = tried
         self.seed = seed
         self._values = values
         self._kind = kind
-        self._errors, self._bias, self._intervals, self.converged, self._json = found
+        self._errors, self._bias, self._intervals, self.tried, self.converged, self._json = found
 
     def interval(self, name: str) -> tuple[float, float]:
         """Give the 95 % interval of an unknown: percentiles of the refits, stretched for the degrees of freedom that residuals have lost.

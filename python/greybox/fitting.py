@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 import os
 from collections.abc import Callable, Mapping
+from pathlib import Path
 from typing import Any
 
 from greybox import _core
@@ -13,7 +14,7 @@ from greybox.model import Model, checked
 from greybox.options import Noise, settings
 from greybox.parameters import Parameter, declared, together
 from greybox.progress import Progress
-from greybox.records import Hold, Initial, Record, framed, kind_of, records
+from greybox.records import Hold, Initial, Record, framed, is_path, kind_of, records
 from greybox.result import Fit
 from greybox.signals import named, near
 
@@ -157,7 +158,8 @@ def fit(
     problem = _core.Problem(equations.core, cores, declared_, chosen)
     with Progress(progress, "fit") as shown:
         estimate = problem.run(shown)
-    found = Fit(equations, cores, declared_, chosen, kind_of(several[0].data), estimate, problem, what)
+    files = [Path(one.data).resolve() for one in several if is_path(one.data)]
+    found = Fit(equations, cores, declared_, chosen, kind_of(several[0].data), estimate, problem, what, files)
     for warning in found.warnings:
         if warning.severity != "usable":
             warn(warning)
@@ -172,7 +174,7 @@ def simulate(
     parameters: Mapping[str, float],
     initial: Mapping[str, float] | None = None,
     noise: Mapping[str, float] | None = None,
-    seed: int = 0,
+    seed: int = 1,
     time: str | None = None,
     sample_time: float | None = None,
     columns: Mapping[str, str] | None = None,

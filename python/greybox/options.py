@@ -73,6 +73,7 @@ class Options(TypedDict, total=False):
 def settings(equations: Equations, given: Options) -> dict[str, Any]:
     """Give the options as the compiled library takes them; those that are not given are the model's."""
     defaults = equations.defaults()
+    chosen = given.get("noise")
     given = Options(**{**defaults, **{name: value for name, value in given.items() if value is not None}})  # type: ignore[typeddict-item]
     inputs, outputs = named(equations.inputs, "inputs"), named(equations.outputs, "outputs")
     noise, starts = given.get("noise"), given.get("starts")
@@ -81,6 +82,9 @@ def settings(equations: Equations, given: Options) -> dict[str, Any]:
     if isinstance(noise, Mapping):
         # Of outputs that are left out, that of a model file stays.
         noise = {**(defaults.get("noise") or {}), **noise}
+    predictor = str(given.get("predictor") or "").partition(":")[0].strip()
+    if chosen and predictor in ("kalman", "second-order"):
+        raise Error(f"noise={chosen!r} has no effect on the predictor {predictor}, a filter: it takes `noise` of the model")
     if starts is not None:
         starts = whole("starts", starts, 1)
     if given.get("staged") and given.get("multiple_shooting"):

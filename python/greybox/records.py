@@ -19,7 +19,7 @@ from greybox.model import Equations
 from greybox.parameters import Parameter, said
 from greybox.signals import Signals, named
 
-__all__ = ["Hold", "Initial", "Record", "filled", "framed", "kind_of", "opened", "records"]
+__all__ = ["Hold", "Initial", "Record", "filled", "framed", "is_path", "kind_of", "opened", "records"]
 
 #: The inputs between samples, of all or by the name of each.
 Hold: TypeAlias = "Literal['zero', 'first'] | Mapping[str, Literal['zero', 'first']]"
@@ -39,7 +39,7 @@ class Record:
         structured array. A row for each sample; further columns are ignored. Or the path of a file: of text with columns (``.csv``), in
         which what is not said is found, or of a kind that :func:`greybox.read` reads.
     name : str, optional
-        The name in reports and errors; that of the file without it.
+        The name in reports and errors; without it that of the file, without its ending.
     time : str, optional
         The column of the time: seconds, or dates, which count from the first. Without it, the column ``t`` or ``time``, or else the
         index of a pandas frame.
@@ -58,7 +58,7 @@ class Record:
     Raises
     ------
     Error
-        If both `time` and `sample_time` are given.
+        If two of `time`, `sample_time` and `columns` of ``t`` are given.
     """
 
     data: Any
@@ -72,11 +72,16 @@ class Record:
     def __post_init__(self) -> None:
         if self.time is not None and self.sample_time is not None:
             raise Error(f"time={self.time!r} and sample_time={self.sample_time!r} both give the time of the samples; leave one out")
+        if isinstance(self.columns, Mapping) and "t" in self.columns:
+            for name, given in (("time", self.time), ("sample_time", self.sample_time)):
+                if given is not None:
+                    both = f"columns={{'t': {self.columns['t']!r}}} and {name}={given!r}"
+                    raise Error(f"{both} both give the time of the samples; leave one out")
 
     def core(self, equations: Equations, name: str, *, outputs: bool = True) -> _core.Record:
         """Give the record as the library takes it. Without `outputs`, those that the frame lacks are missing measurements."""
         inputs, measured = named(equations.inputs, "inputs"), named(equations.outputs, "outputs")
-        data, name = opened(self.data), self.name or (Path(self.data).name if is_path(self.data) else name)
+        data, name = opened(self.data), self.name or (Path(self.data).stem if is_path(self.data) else name)
         if isinstance(data, Path):
             columns_ = {**(self.columns or {}), **({} if self.time is None else {"t": self.time})}
             try:
@@ -127,9 +132,7 @@ def _in_python(text: str) -> str:
         (r'DataFile::unit\("([^"]+)", ("[^"]+")\), which', r"a frame in which `\1` is converted from \2, which"),
         (r', which converts it, or DataFile::factor\("[^"]+", 1\) if', r", or a frame as it stands if"),
         (r'give DataFile::factor\("[^"]+", 1\) if', r"give a frame as it stands if"),
-        (r"DataFile::column", 'columns={"signal": "column"}, or time="column"'),
-        (r"DataFile::sample_time", "sample_time"),
-        (r"DataFile::(\w+)", r"pandas.read_csv (here is no option \1)"),
+        (r'give DataFile::factor\("([^"]+)", \.\.\)', r"give a frame in which `\1` is converted"),
     ):
         text = re.sub(theirs, ours, text)
     return text

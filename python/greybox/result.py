@@ -5,13 +5,14 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from greybox import _core
 from greybox.bootstrap import Bootstrap
-from greybox.errors import Error
+from greybox.errors import Error, FitWarning, RecordWarning, warn
 from greybox.estimate import Estimate
 from greybox.frames import Array, Kind
 from greybox.model import Equations
@@ -20,7 +21,7 @@ from greybox.parameters import Parameter
 from greybox.process_noise import ProcessNoise
 from greybox.profile import Profile
 from greybox.progress import Progress
-from greybox.records import Record, filled, framed, kind_of
+from greybox.records import Record, filled, framed, is_path, kind_of
 from greybox.report import Report
 from greybox.signals import distinct, named, near
 
@@ -46,6 +47,7 @@ class Fit(Estimate):
         estimate: _core.Estimate,
         problem: _core.Problem | None,
         what: Record,
+        files: list[Path],
     ) -> None:
         self._equations = equations
         self._records = records
@@ -55,6 +57,7 @@ class Fit(Estimate):
         self._estimate = estimate
         self._made = problem
         self._what = what
+        self._files = files
 
     def __getstate__(self) -> dict[str, Any]:
         return {**self.__dict__, "_made": None}
@@ -146,7 +149,12 @@ class Fit(Estimate):
         if data is None:
             return self._records
         record = data if isinstance(data, Record) else Record(data, **said)
-        return [filled(record, replace(self._what, initial=None)).core(self._equations, "record", outputs=False)]
+        core = filled(record, replace(self._what, initial=None)).core(self._equations, "record", outputs=False)
+        is_other = is_path(record.data) and record.name is None and Path(record.data).resolve() not in self._files
+        if is_other and any(one.per_experiment for one in self._declared) and core.name in [one.name for one in self._records]:
+            text = f"{record.data} is no file of the fit, and takes the own parameters of its record `{core.name}`, whose name it has"
+            warn(RecordWarning(f"{text}; say so by gb.Record(..., name={core.name!r}), or give it another name"))
+        return [core]
 
     def _as(self, data: Any) -> Kind:
         """Give what makes a frame of the kind of these data, or of the fit's."""
@@ -227,12 +235,21 @@ class Fit(Estimate):
         ------
         Error
             If blocks are longer than half of a record, or fewer than twenty refits ended.
+
+        Warns
+        -----
+        FitWarning
+            If the time limit of the fit ended it after fewer refits. Ctrl-C ends it without a result.
         """
         count, seed = whole("count", count, 1), whole("seed", seed, 0)
         blocks = None if blocks is None else whole("blocks", blocks, 0)
         with Progress(progress, "bootstrap", count) as shown:
             found = self._problem.bootstrap(self._estimate, blocks, count, seed, shown)
-        return Bootstrap(self.unknowns, [row[2] for row in self._estimate.unknowns], count, seed, self._kind, found)
+        made = Bootstrap(self.unknowns, [row[2] for row in self._estimate.unknowns], seed, self._kind, found)
+        if made.tried < count:
+            text = f"the time limit ended the bootstrap after {made.tried} of {count} refits: the intervals are of these"
+            warn(FitWarning("bootstrap_ended", "usable", text))
+        return made
 
     def report(
         self,

@@ -118,8 +118,8 @@ impl Problem {
         Ok((end(found.lower), end(found.upper), values, rises, found.threshold, found.remark, json))
     }
 
-    /// Refits of resampled records: standard errors, biases and intervals of the unknowns, refits that ended, and all of it as JSON. In
-    /// blocks of so many residuals; without, one by one.
+    /// Refits of resampled records: standard errors, biases and intervals of the unknowns, refits that were tried and that ended, and all
+    /// of it as JSON. In blocks of so many residuals; without, one by one.
     #[expect(clippy::type_complexity, reason = "a tuple for Python")]
     fn bootstrap(
         &self,
@@ -129,12 +129,12 @@ impl Problem {
         count: usize,
         seed: u64,
         show: Option<&Bound<'_, PyAny>>,
-    ) -> PyResult<(Vec<f64>, Vec<f64>, Vec<(f64, f64)>, u64, String)> {
+    ) -> PyResult<(Vec<f64>, Vec<f64>, Vec<(f64, f64)>, u64, u64, String)> {
         let resampling = blocks.map_or(Resampling::Residuals, Resampling::Blocks);
         let work = || diagnose::bootstrap(&self.problem, &estimate.0, resampling, count, seed);
         let found = self.whole(py, show, work)?;
         let json = serde_json::to_string(&found).map_err(raised)?;
-        Ok((found.standard_errors, found.bias, found.intervals, found.converged, json))
+        Ok((found.standard_errors, found.bias, found.intervals, found.tried, found.converged, json))
     }
 
     /// The test of process noise: names of the levels, likelihood ratio, degrees of freedom and p-value.

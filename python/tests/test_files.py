@@ -87,7 +87,7 @@ def test_several_files_and_what_is_said_of_each(tmp_path: Path) -> None:
         pd.DataFrame(cooled(k=k)).rename(columns={"t": "when", "body": "T"}).to_csv(tmp_path / f"{name}.csv", index=False, sep=";", decimal=",")
     paths = [tmp_path / "cold.csv", tmp_path / "warm.csv"]
     found = gb.fit(cooling(), paths, k=gb.free(1.0, per_experiment=True), time="when", columns={"body": "T"})
-    assert [one["name"] for one in found.to_dict()["experiments"]] == ["cold.csv", "warm.csv"]
+    assert [one["name"] for one in found.to_dict()["experiments"]] == ["cold", "warm"]
     assert found.parameters.k == pytest.approx(0.3, rel=0.01)
     with pytest.raises(gb.Error, match="no column `body`; the file has: when, room, T; name another with columns="):
         gb.fit(cooling(), paths[0], k=gb.free(1.0), time="when")
@@ -102,10 +102,27 @@ def test_files_of_one_name_in_two_folders_are_two_records(kind: str, tmp_path: P
         path.parent.mkdir()
         FILES[kind](path, cooled(k=k))
     found = gb.fit(cooling(), paths, k=gb.free(1.0, per_experiment=True))
-    names = [f"run.{kind} #1", f"run.{kind} #2"]
+    names = ["run #1", "run #2"]
     assert [name for name in found.unknowns if name.startswith("k")] == [f"k [{name}]" for name in names]
     of = pd.DataFrame(found.to_dataframe())["record"]
     assert of.value_counts(sort=False).to_dict() == dict.fromkeys(names, 200)
+
+
+def test_another_file_of_a_record_s_name_is_said_to_take_its_parameters(tmp_path: Path) -> None:
+    paths = [tmp_path / "cold.csv", tmp_path / "warm.csv"]
+    for path, k in zip(paths, (0.3, 0.5), strict=True):
+        pd.DataFrame(cooled(k=k)).to_csv(path, index=False)
+    found = gb.fit(cooling(), paths, k=gb.free(1.0, per_experiment=True))
+    (tmp_path / "later").mkdir()
+    other = tmp_path / "later" / "warm.csv"
+    other.write_bytes(paths[1].read_bytes())
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", gb.RecordWarning)
+        same = found.predict(paths[1])["body"]
+        named = found.predict(gb.Record(other, name="warm"))["body"]
+    with pytest.warns(gb.RecordWarning, match="takes the own parameters of its record `warm`"):
+        unsaid = found.predict(other)["body"]
+    assert (same == named).all() and (same == unsaid).all()
 
 
 def test_a_unit_that_is_not_the_signals_is_refused_with_the_factor(tmp_path: Path, declared: dict[str, gb.Parameter]) -> None:

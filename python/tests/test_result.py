@@ -144,6 +144,14 @@ def test_bootstrap(fitted: gb.Fit, tmp_path: Path) -> None:
         drawn.interval("r")
 
 
+def test_a_time_limit_keeps_the_refits_so_far() -> None:
+    found = gb.fit(cooling(), cooled(), k=gb.free(1.0), time_limit=5.0)
+    with pytest.warns(gb.FitWarning, match="of 10000000 refits") as caught:
+        drawn = found.bootstrap(10_000_000)
+    assert 20 <= drawn.converged <= drawn.tried < 10_000_000
+    assert f"after {drawn.tried} of" in str(caught[0].message)
+
+
 def test_bands(fitted: gb.Fit) -> None:
     bands = fitted.bands(0.95)
     assert list(bands.columns) == ["t", "id_confidence", "iq_confidence", "id_prediction", "iq_prediction"]

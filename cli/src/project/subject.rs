@@ -3,7 +3,7 @@
 use clap::{Arg, ArgAction};
 
 /// Options of which one has no effect, or no meaning, beside the other.
-const CONTRARY: [(&str, &str); 13] = [
+const CONTRARY: [(&str, &str); 12] = [
     ("fix", "free"),
     ("fix", "set"),
     ("fix", "bounds"),
@@ -14,7 +14,6 @@ const CONTRARY: [(&str, &str); 13] = [
     ("staged", "multiple-shooting"),
     ("column", "sample-time"),
     ("unit", "sample-time"),
-    ("time-unit", "sample-time"),
     ("date-order", "sample-time"),
     ("zone", "sample-time"),
 ];
@@ -35,6 +34,7 @@ impl Subject {
         let long = option.get_long().unwrap_or_default();
         let (long, name) = match (long, value) {
             ("time", _) => ("column", Some("t")),
+            ("time-unit", _) => ("unit", Some("t")),
             ("sample-time", _) => (long, Some("t")),
             ("initial", "first" | "steady") => (long, None),
             _ if WHOLE.contains(&long) => (long, None),
@@ -84,6 +84,7 @@ mod tests {
             (("column", "t=Time"), ("sample-time", "1e-3")),
             (("time-unit", "ms"), ("sample-time", "1e-3")),
             (("unit", "t=0.001"), ("sample-time", "1e-3")),
+            (("time-unit", "ms"), ("unit", "t=s")),
             (("zone", "Europe/Berlin"), ("sample-time", "1e-3")),
             (("date-order", "day"), ("sample-time", "1e-3")),
             (("time", "Time"), ("column", "t=Zeit")),
@@ -99,6 +100,7 @@ mod tests {
             (("initial", "id=0"), ("initial", "iq=0")),
             (("column", "w=speed"), ("sample-time", "1e-3")),
             (("unit", "w=rpm"), ("sample-time", "1e-3")),
+            (("time-unit", "ms"), ("unit", "w=rpm")),
             (("loss", "huber"), ("starts", "20")),
         ] {
             assert!(!meet(one, other), "{one:?} {other:?}");

@@ -178,8 +178,11 @@ fn files_that_cannot_be_written_are_named_at_once() {
         assert!(out.is_empty() && error.starts_with("error: nowhere/r.html: there is no such folder"), "{error}");
     }
     for command in ["simulate", "convert"] {
-        let (_, error) = bench.ends(1, &[command, "pmsm.toml", "record.csv", "--out", "made.txt"]);
-        assert!(error.starts_with("error: made.txt: ") && error.contains("take .csv or .json"), "{error}");
+        for (file, ending) in [("made.txt", ".txt"), ("made.json", ".json")] {
+            let (_, error) = bench.ends(1, &[command, "pmsm.toml", "record.csv", "--out", file]);
+            let says = format!("error: {file}: files that end in {ending} are not written; take .csv");
+            assert!(error.starts_with(&says), "{error}");
+        }
     }
 }
 
@@ -386,6 +389,16 @@ fn options_without_a_meaning_are_refused() {
         let error = simulate(option, value);
         assert!(error.contains("it has no meaning here; it is an option of fit, compare, "), "{error}");
     }
+    for (option, value) in [("--noise", &["id=1"][..]), ("--noise-covariance", &[])] {
+        let words = [&["fit", "pmsm.toml", "record.csv", "--predictor", "kalman", option], value].concat();
+        let (_, error) = bench.ends(1, &words);
+        let says = format!("{} has no effect on the predictor kalman, a filter", [&[option], value].concat().join(" "));
+        assert!(error.contains(&says), "{error}");
+    }
+    let (_, error) = bench.ends(1, &["fleet", "pmsm.toml", "record.csv", "--per-record", "rs"]);
+    assert!(error.contains("--per-record rs: each record of a fleet is fitted by itself"), "{error}");
+    let (help, _) = bench.ends(0, &["fleet", "--help"]);
+    assert!(!help.contains("--per-record") && !help.contains("--checkpoint") && help.contains("--prior"), "{help}");
     assert!(simulate("--noise", "id=-1").contains("-1 is no standard deviation; give a positive number, or 0"));
     let timed = |option: &str, value: &str| {
         let words = ["check", "pmsm.toml", "record.csv", "--sample-time", "5e-4", option, value];
@@ -463,30 +476,31 @@ fn each_record_has_its_own_parameter() {
         .filter_map(|line| line.split_whitespace().find_map(|word| word.parse().ok().filter(|fit| *fit > 1.0)))
         .collect();
     assert!(fits.len() == 2 && fits.iter().all(|fit| *fit > 95.0), "{out}");
-    // Of two records of one name each has its own, too; one that was not fitted has none, and is left out.
+    // Of two records of one name each has its own, too.
     for name in ["slow", "fast"] {
         std::fs::create_dir(bench.path(name)).unwrap();
         std::fs::copy(bench.path(&format!("{name}.csv")), bench.path(&format!("{name}/run.csv"))).unwrap();
     }
-    let twins = [
-        "compare",
-        "--model",
-        "lag.toml",
-        "--per-record",
-        "p",
-        "slow/run.csv",
-        "fast/run.csv",
-        "--validation",
-        "slow.csv",
-    ];
-    let Output { stdout, stderr, .. } = bench.run(&twins);
-    let [out, remarks] = [stdout, stderr].map(|text| String::from_utf8(text).unwrap());
-    let percents = out
-        .lines()
-        .filter(|line| line.contains("estimation"))
-        .filter_map(|line| line.split_whitespace().find_map(|word| word.parse::<f64>().ok().filter(|fit| *fit > 1.0)));
-    assert!(percents.filter(|fit| *fit > 95.0).count() == 2, "{out}");
-    assert!(remarks.contains("slow.csv is left out") && !out.contains("validation"), "{remarks} {out}");
+    let twins = ["lag.toml", "--per-record", "p", "slow/run.csv", "fast/run.csv"];
+    bench.run(&[&["fit", "--json", "twins.json"], &twins[..]].concat());
+    let stored = ["lag.toml:twins.json", "--per-record", "p", "slow/run.csv", "fast/run.csv"];
+    for (words, is_stored) in [(&twins[..], false), (&stored[..], true)] {
+        let Output { stdout, stderr, .. } = bench.run(&[&["compare", "--model"], words].concat());
+        let [out, remarks] = [stdout, stderr].map(|text| String::from_utf8(text).unwrap());
+        let percents =
+            out.lines().filter(|line| line.contains("estimation") && line.contains("run #")).filter_map(|line| {
+                line.split_whitespace().find_map(|one| one.parse::<f64>().ok().filter(|fit| *fit > 1.0))
+            });
+        assert!(percents.filter(|fit| *fit > 95.0).count() == 2, "{out}");
+        let places = "slow/run.csv of `run #1`, fast/run.csv of `run #2`";
+        assert!(remarks.contains(places) == is_stored, "{remarks}");
+        // One that was not fitted has none, whatever its name.
+        for other in ["slow.csv", "slow/run.csv"] {
+            let words = [&["compare", "-q", "--model"], words, &["--validation", other]].concat();
+            let (_, error) = bench.ends(1, &words);
+            assert!(error.contains(&format!("error: {other}: parameter `p` of lag.toml")), "{error}");
+        }
+    }
     let last = |words: &[&str]| {
         let (out, _) = bench.ends(0, words);
         out.lines().nth(22).unwrap().rsplit(',').next().unwrap().parse::<f64>().unwrap()
@@ -518,4 +532,39 @@ fn a_simulation_begins_at_the_first_sample() {
     std::fs::write(bench.path("inputs.csv"), inputs).unwrap();
     let (_, error) = bench.ends(1, &["simulate", "pmsm.toml", "inputs.csv", "--initial", "first"]);
     assert!(error.contains("no column `id`"), "{error}");
+}
+
+/// Its state at the first sample is of the fit's record of its name alone; any other begins as the model says.
+#[test]
+fn a_record_of_another_name_begins_as_the_model_says() {
+    let bench = Bench::new();
+    let model = "greybox = 1\n[inputs]\nroom = \"degC\"\n[parameters]\nk = { unit = \"1/s\", start = 1.0 }\n[states]\n\
+                 body = { unit = \"degC\", derivative = \"k*(room - body)\", initial = \"first\" }\n[outputs]\nbody = \"body\"\n";
+    std::fs::write(bench.path("cooling.toml"), model).unwrap();
+    for (name, start) in [("warm", 80.0), ("cold", 5.0)] {
+        let row = |k: i32| {
+            let t = 0.1 * f64::from(k);
+            format!("{t},20,{}\n", 20.0 + (start - 20.0) * (-0.5 * t).exp() + 0.01 * f64::from(k * 37 % 21 - 10))
+        };
+        let rows: String = (0..100).map(row).collect();
+        std::fs::write(bench.path(&format!("{name}.csv")), format!("t,room,body\n{rows}")).unwrap();
+    }
+    bench.run(&["fit", "cooling.toml", "warm.csv", "--json", "e.json"]);
+    let begins = |words: &[&str]| {
+        let (out, remarks) = bench.ends(0, &[&["simulate", "cooling.toml"], words].concat());
+        let cell = out.lines().nth(1).unwrap().rsplit(',').next().unwrap().parse::<f64>().unwrap();
+        (cell, remarks)
+    };
+    // The measured ones are off by 0.1 degC at the first sample.
+    let (warm, remarks) = begins(&["warm.csv", "--estimate", "e.json"]);
+    assert!(
+        (warm - 80.0).abs() < 0.2 && remarks.contains("record `warm` of the estimate begins at body = "),
+        "{remarks}"
+    );
+    let (cold, remarks) = begins(&["cold.csv", "--estimate", "e.json"]);
+    assert!((cold - 5.0).abs() < 0.2 && remarks.contains("as the model says, or from zero"), "{cold} {remarks}");
+    let (_, remarks) = begins(&["cold.csv"]);
+    assert!(remarks.contains("the values of k are the starts of a fit"), "{remarks}");
+    let (zero, remarks) = begins(&["cold.csv", "--initial", "body=0", "--fix", "k=0.5"]);
+    assert!(zero == 0.0 && !remarks.contains("starts") && !remarks.contains("record begins"), "{remarks}");
 }

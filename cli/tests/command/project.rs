@@ -92,3 +92,22 @@ fn entries_say_what_they_take() {
         assert!(error.starts_with("error: greybox.toml: ") && error.contains(says), "{entry}\n{error}");
     }
 }
+
+/// A simulation reads no outputs, of which the project may say a column and a unit.
+#[test]
+fn what_is_said_of_outputs_is_in_no_simulation_s_way() {
+    let fixed = "fix = { rs = 0.63, ls = 4e-3, ke = 0.95 }";
+    let (plain, _) = project(fixed).ends(0, &["simulate"]);
+    let bench = project(&format!("unit = {{ id = 'mA' }}\ncolumn = {{ iq = 'current' }}\n{fixed}"));
+    let (out, _) = bench.ends(0, &["simulate"]);
+    assert!(out == plain && out.lines().count() == 2001, "{}", out.lines().count());
+    let (_, error) = bench.ends(1, &["simulate", "--unit", "v=rpm"]);
+    assert!(error.contains("the model has no signal `v`"), "{error}");
+}
+
+#[test]
+fn a_unit_of_time_takes_the_place_of_the_project_s() {
+    let bench = project("unit = ['t=ms']");
+    let words = ["fit", "--time-unit", "s"];
+    assert_eq!(value(&answers(&bench, &words), "rs"), value(&answers(&project(""), &words), "rs"));
+}
