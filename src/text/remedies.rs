@@ -10,6 +10,7 @@
 /// assert_eq!(renamed("ask for more starts (Fit::starts)", &names), "ask for more starts (--starts)");
 /// assert_eq!(renamed("look for it: Fit::starts(32)", &names), "look for it: --starts 32");
 /// assert_eq!(renamed("give DataFile::factor(\"w\", 0.1), or 1", &names), "give --unit w=0.1, or 1");
+/// assert_eq!(renamed("see DataFile::factors", &names), "see DataFile::factors"); // of another name
 /// ```
 pub fn renamed(text: &str, names: &[(&str, &str)]) -> String {
     names.iter().fold(text.to_owned(), |text, (function, name)| {
@@ -18,6 +19,11 @@ pub fn renamed(text: &str, names: &[(&str, &str)]) -> String {
         let mut pieces = text.split(function);
         let mut found = pieces.next().unwrap_or_default().to_owned();
         for piece in pieces {
+            // Another function, whose name begins with this one.
+            if function.ends_with(char::is_alphanumeric) && piece.starts_with(|c: char| c.is_alphanumeric() || c == '_') {
+                found.extend([function, piece]);
+                continue;
+            }
             match arguments(piece).filter(|_| takes) {
                 Some((given, rest)) => found.extend([&name.replace("{}", &given), rest]),
                 None => found.extend([alone, piece]),
