@@ -386,7 +386,6 @@ fn listed(columns: &[String], wanted: &str, signal: &str) -> String {
         [single] if single.contains([';', '\t', '|']) => {
             "set what stands between cells with DataFile::delimiter, or DataFile::decimal_comma where numbers are written as 1,5"
         }
-        _ if columns.iter().any(|name| name.contains('\u{FFFD}')) => "the file is not UTF-8; save it as UTF-8",
         _ if columns.iter().all(|name| name.parse::<f64>().is_ok()) => "its first line must hold the names",
         _ if signal == "t" => "name another with DataFile::column, or give DataFile::sample_time",
         _ => "name another with DataFile::column",
@@ -447,7 +446,12 @@ fn other_unit((column, model): (&str, &str), signal: &str, factor: Option<f64>) 
         }
         (None, Relation::OtherZero { .. }) => {
             format!(
-                "their zeros differ: give DataFile::unit(\"{signal}\", \"{column}\"), which converts it, or {taken}"
+                "their zeros differ: give DataFile::unit(\"{signal}\", \"{column}\"), which converts it with its zero (without DataFile::offset), or {taken}"
+            )
+        }
+        (None, Relation::Ambiguous { revolutions, radians }) => {
+            format!(
+                "give DataFile::factor(\"{signal}\", {revolutions}) if it counts revolutions, or DataFile::factor(\"{signal}\", {radians}) if radians"
             )
         }
         (None, Relation::Unknown) => {

@@ -1,5 +1,6 @@
 //! Reading: a file's columns become a record, those of a text row by row.
 
+use super::bytes::decoded;
 use super::columns;
 use super::guess::{names, split_unit};
 use super::numbers::Numbers;
@@ -248,7 +249,7 @@ impl DataFile {
     ) -> Error {
         let Some(value) = value else {
             let (path, line, name) = (self.path.clone(), table.line(), table.names()[column].clone());
-            let text = String::from_utf8_lossy(table.cell(column)).into_owned();
+            let text = decoded(table.cell(column)).into_owned();
             return Error::NotANumber { path, line, column: name, text };
         };
         let (experiment, signal) = (self.name(), signal.to_owned());
@@ -312,6 +313,7 @@ impl Rows {
             decimal_comma: numbers.comma(),
             preamble: form.preamble as u64,
             units_row: form.units.is_some(),
+            windows: form.windows,
             time: source,
             units: plan.units.clone(),
             filled: vec![],

@@ -1,5 +1,6 @@
 //! [`Timing`]: the time of each row, from a column of numbers, from one of dates, or from a constant step.
 
+use super::bytes::decoded;
 use super::dates::Dates;
 use super::guess::split_unit;
 use super::numbers::Numbers;
@@ -157,11 +158,11 @@ impl DataFile {
         }
         let dates = Box::new(self.dates_of()?);
         let mut date = None;
-        let text = String::from_utf8_lossy(cell).into_owned();
+        let text = decoded(cell).into_owned();
         if !matches!(Stamp::read(&text), Some(Stamp::Instant(_) | Stamp::Local(_))) {
             let is_date = |at: &usize| {
                 let name = table.names()[*at].to_lowercase();
-                let cell = String::from_utf8_lossy(table.cell(*at));
+                let cell = decoded(table.cell(*at));
                 DATES.contains(&name.as_str()) && matches!(Stamp::read(&cell), Some(Stamp::Local(_)))
             };
             date = (0..table.names().len()).find(is_date);
@@ -228,7 +229,7 @@ impl Timing {
                 Ok(time)
             }
             Timing::Dates { column, date, dates, first } => {
-                let cell = |at: usize| String::from_utf8_lossy(table.cell(at));
+                let cell = |at: usize| decoded(table.cell(at));
                 let text = match date {
                     Some(date) => format!("{} {}", cell(*date), cell(*column)),
                     None => cell(*column).into_owned(),
