@@ -221,7 +221,14 @@ impl DataFile {
             match (relation(file, model), said.unit.is_some()) {
                 (Relation::Same, _) => {}
                 (Relation::Factor(found), true) => factor = found,
-                (Relation::OtherZero { factor: found, shift }, true) => (factor, offset) = (found, offset + shift),
+                (Relation::OtherZero { .. }, true) if offset != 0.0 => {
+                    let name = &signal.name;
+                    return Err(Error::Option(format!(
+                        "`{name}` has a unit, {file}, which is converted to {model} with its zero, and an offset, {offset}: leave out \
+                         DataFile::offset, or take DataFile::factor for DataFile::unit"
+                    )));
+                }
+                (Relation::OtherZero { factor: found, shift }, true) => (factor, offset) = (found, shift),
                 // An offset was said, and kelvins are as large as degrees Celsius.
                 (Relation::OtherZero { factor, .. }, false) if factor == 1.0 && offset != 0.0 => {}
                 (Relation::Unknown, false) => {
