@@ -7,7 +7,7 @@ use super::numbers::Numbers;
 use super::reading::{of_size, time_unit};
 use super::stamp::Stamp;
 use super::table::Table;
-use super::{DataFile, TimeSource};
+use super::{Column, DataFile, TimeSource};
 use crate::error::Error;
 use crate::numeral::{Moment, TimeUnit};
 use crate::record::{Clock, Time};
@@ -106,6 +106,7 @@ impl DataFile {
         first: f64,
     ) -> Result<Option<Ticks>, Error> {
         let (name, said) = (&names[column], self.said("t"));
+        self.no_dates(name)?;
         if name.is_empty() && said.name.is_none() {
             return self.place(names, "t").map(|_| None);
         }
@@ -131,8 +132,35 @@ impl DataFile {
         Ok(Some(Ticks { column, unit, shown, offset: said.offset, origin }))
     }
 
+    /// Refuses what was said of dates, of a column of time that has none.
+    pub(super) fn no_dates(&self, column: &str) -> Result<(), Error> {
+        let said = self.zone.as_ref().map(|_| "DataFile::zone").or(self.dates.map(|_| "DataFile::dates"));
+        let refused = |option| {
+            Err(Error::Option(format!(
+                "column `{column}` has times that are no dates, so that {option} has no effect: leave it out"
+            )))
+        };
+        said.map_or(Ok(()), refused)
+    }
+
+    /// Refuses what was said of numbers, of a column of time that has dates or times of day.
+    fn no_numbers(&self, column: &str) -> Result<(), Error> {
+        let said = self.said("t");
+        let option = match &said {
+            Column { factor: Some(_), .. } => "DataFile::factor",
+            Column { unit: Some(_), .. } => "DataFile::unit",
+            Column { reversed: true, .. } => "DataFile::reversed",
+            Column { offset, .. } if *offset != 0.0 => "DataFile::offset",
+            _ => return Ok(()),
+        };
+        Err(Error::Option(format!(
+            "column `{column}` has dates or times of day, whose unit is known, so that {option} of `t` has no effect: leave it out"
+        )))
+    }
+
     /// Dates in a column, in the order and the zone that were said.
-    pub(super) fn dates_of(&self) -> Result<Dates, Error> {
+    pub(super) fn dates_of(&self, column: &str) -> Result<Dates, Error> {
+        self.no_numbers(column)?;
         let zone = self.zone.as_ref().map(|zone| {
             TimeZone::get(zone).map_err(|error| Error::Option(format!("DataFile::zone(\"{zone}\"): {error}")))
         });
@@ -156,9 +184,13 @@ impl DataFile {
             let stamps = if kept || !self.path.is_file() { Some(Vec::new()) } else { None };
             return Ok(Timing::Numbers { ticks, clock: Clock::default(), stamps });
         }
-        let dates = Box::new(self.dates_of()?);
-        let mut date = None;
         let text = decoded(cell).into_owned();
+        let dates = Box::new(match Stamp::read(&text) {
+            Some(_) => self.dates_of(&table.names()[column])?,
+            // No date either; the first row says so.
+            None => Dates::new(None, None),
+        });
+        let mut date = None;
         if !matches!(Stamp::read(&text), Some(Stamp::Instant(_) | Stamp::Local(_))) {
             let is_date = |at: &usize| {
                 let name = table.names()[*at].to_lowercase();
