@@ -33,6 +33,7 @@ mod expression;
 mod factor;
 mod latex;
 mod lex;
+mod markdown;
 mod names;
 mod parse;
 mod read;
