@@ -135,6 +135,9 @@ fn each_mistake_in_a_table_has_its_message() {
         let error = Model::named("model.toml", &table(&text)).unwrap_err();
         assert_eq!(error.remarks()[0].title(), title, "{error}");
     }
+    let error = Model::named("model.toml", &table("x = [0, 1]\nvalues = [0, 1]")).unwrap_err();
+    let remedy = error.remarks()[0].remedy().unwrap();
+    assert!(["outside = \"hold\"", "\"linear\""].iter().all(|value| remedy.contains(value)), "{remedy}");
 }
 
 /// All mistakes are shown, each with its line and a caret.
