@@ -327,6 +327,19 @@ pub enum Error {
         /// The remedy.
         remedy: &'static str,
     },
+    /// A record that is thinned for a model of which each sample is a step.
+    #[error(
+        "experiment `{experiment}`: every {every}-th sample (Record::decimate({every})) would be a record of another plant: {why}, which would come \
+         less often, by means of the inputs; take all samples, or resample the record yourself and write the model for the longer interval"
+    )]
+    Thinned {
+        /// Name of the experiment.
+        experiment: String,
+        /// Of how many samples one was to be kept.
+        every: usize,
+        /// What each sample does.
+        why: String,
+    },
     /// A simulation that fails where the search was to start.
     #[error("the start cannot be evaluated: {0}")]
     Start(Failure),

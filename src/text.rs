@@ -43,6 +43,7 @@ mod rust;
 mod section;
 mod shipped;
 mod string;
+mod thinned;
 mod toml_value;
 mod write;
 
