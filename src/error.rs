@@ -459,7 +459,7 @@ fn other_unit((column, model): (&str, &str), signal: &str, factor: Option<f64>) 
         }
         (None, Relation::OtherZero { .. }) => {
             format!(
-                "their zeros differ: give DataFile::unit(\"{signal}\", \"{column}\"), which converts it with its zero (without DataFile::offset), or {taken}"
+                "their zeros differ: give DataFile::unit(\"{signal}\", \"{column}\"), which converts it, or {taken}"
             )
         }
         (None, Relation::Ambiguous { revolutions, radians }) => {

@@ -196,7 +196,7 @@ impl DataFile {
     }
 
     /// Unit of the cells of `signal`, whatever the file says: they are converted to the signal's. `unit("w", "rpm")` multiplies by 0.1047 for
-    /// `rad/s`; `unit("temp", "degF")` for `degC` subtracts 32 first.
+    /// `rad/s`; `unit("temp", "degF")` for `degC` subtracts 32 first, beside which there is no offset.
     pub fn unit(self, signal: &str, unit: &str) -> Self {
         self.with(signal, |column| column.unit = Some(unit.to_owned()))
     }

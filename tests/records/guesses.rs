@@ -227,8 +227,7 @@ fn a_unit_that_is_said_converts() {
     }
     let read = |unit: &str| DataFile::new(file("temperature", format!("t,temp [{unit}]\n0,300\n1,301\n2,302\n")));
     for (unit, model, cell) in [("K", "degC", 300.0 - 273.15), ("degC", "K", 573.15), ("degF", "degC", 268.0 / 1.8)] {
-        let remedy =
-            format!("their zeros differ: give DataFile::unit(\"temp\", \"{unit}\"), which converts it with its zero");
+        let remedy = format!("their zeros differ: give DataFile::unit(\"temp\", \"{unit}\"), which converts it");
         says(read(unit).read_record(&layout(model)), &[&format!("column `temp [{unit}]`"), &remedy]);
         let converted = read(unit).unit("temp", unit).read_record(&layout(model)).unwrap();
         assert!((converted.outputs()[0].values[0] - cell).abs() < 1e-12, "{unit} {model}");
@@ -236,11 +235,11 @@ fn a_unit_that_is_said_converts() {
     let shifted = read("K").offset("temp", -273.15).read_record(&layout("degC")).unwrap();
     assert_eq!(shifted.outputs()[0].values[0], 300.0 - 273.15);
     // A degree Fahrenheit is smaller.
-    let without = ["their zeros differ", "without DataFile::offset"];
-    says(read("degF").offset("temp", -17.8).read_record(&layout("degC")), &without);
+    let offset = || read("degF").offset("temp", -17.8);
+    let without = ["offset of -17.8", "give DataFile::unit(\"temp\", \"degF\")", "leave out DataFile::offset"];
+    says(offset().read_record(&layout("degC")), &without);
     // The conversion has the offset already.
-    let twice = read("degF").unit("temp", "degF").offset("temp", -17.8).read_record(&layout("degC"));
-    says(twice, &["`temp` has a unit, degF", "an offset, -17.8", "leave out DataFile::offset"]);
+    says(offset().unit("temp", "degF").read_record(&layout("degC")), &without);
     let path = file("said_units", "t,ud,w,id,iq\n0,1,60,3,4\n1000,1,60,3,4\n");
     let drive = || DataFile::new(&path);
     let record = drive().unit("w", "rpm").unit("t", "ms").read(&Pmsm).unwrap();

@@ -221,16 +221,16 @@ impl DataFile {
             match (relation(file, model), said.unit.is_some()) {
                 (Relation::Same, _) => {}
                 (Relation::Factor(found), true) => factor = found,
-                (Relation::OtherZero { .. }, true) if offset != 0.0 => {
+                // An offset was said, and kelvins are as large as degrees Celsius.
+                (Relation::OtherZero { factor, .. }, false) if factor == 1.0 && offset != 0.0 => {}
+                (Relation::OtherZero { .. }, _) if offset != 0.0 => {
                     let name = &signal.name;
                     return Err(Error::Option(format!(
-                        "`{name}` has a unit, {file}, which is converted to {model} with its zero, and an offset, {offset}: leave out \
-                         DataFile::offset, or take DataFile::factor for DataFile::unit"
+                        "the cells of `{name}` are in {file}, whose zero is not that of {model}, and an offset of {offset} was given: give \
+                         DataFile::unit(\"{name}\", \"{file}\"), which has the zero, and leave out DataFile::offset"
                     )));
                 }
                 (Relation::OtherZero { factor: found, shift }, true) => (factor, offset) = (found, shift),
-                // An offset was said, and kelvins are as large as degrees Celsius.
-                (Relation::OtherZero { factor, .. }, false) if factor == 1.0 && offset != 0.0 => {}
                 (Relation::Unknown, false) => {
                     if !file.is_empty() {
                         units.push((signal.name.clone(), file.to_owned(), signal.unit.clone()));
