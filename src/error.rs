@@ -327,6 +327,19 @@ pub enum Error {
         /// The remedy.
         remedy: &'static str,
     },
+    /// A record that is thinned for a model of which each sample is a step.
+    #[error(
+        "experiment `{experiment}`: every {every}-th sample (Record::decimate({every})) would be a record of another plant: {why}, which would come \
+         less often, by means of the inputs; take all samples, or resample the record yourself and write the model for the longer interval"
+    )]
+    Thinned {
+        /// Name of the experiment.
+        experiment: String,
+        /// Of how many samples one was to be kept.
+        every: usize,
+        /// What each sample does.
+        why: String,
+    },
     /// A simulation that fails where the search was to start.
     #[error("the start cannot be evaluated: {0}")]
     Start(Failure),
@@ -386,7 +399,6 @@ fn listed(columns: &[String], wanted: &str, signal: &str) -> String {
         [single] if single.contains([';', '\t', '|']) => {
             "set what stands between cells with DataFile::delimiter, or DataFile::decimal_comma where numbers are written as 1,5"
         }
-        _ if columns.iter().any(|name| name.contains('\u{FFFD}')) => "the file is not UTF-8; save it as UTF-8",
         _ if columns.iter().all(|name| name.parse::<f64>().is_ok()) => "its first line must hold the names",
         _ if signal == "t" => "name another with DataFile::column, or give DataFile::sample_time",
         _ => "name another with DataFile::column",
@@ -448,6 +460,11 @@ fn other_unit((column, model): (&str, &str), signal: &str, factor: Option<f64>) 
         (None, Relation::OtherZero { .. }) => {
             format!(
                 "their zeros differ: give DataFile::unit(\"{signal}\", \"{column}\"), which converts it, or {taken}"
+            )
+        }
+        (None, Relation::Ambiguous { revolutions, radians }) => {
+            format!(
+                "give DataFile::factor(\"{signal}\", {revolutions}) if it counts revolutions, or DataFile::factor(\"{signal}\", {radians}) if radians"
             )
         }
         (None, Relation::Unknown) => {

@@ -33,6 +33,7 @@ mod expression;
 mod factor;
 mod latex;
 mod lex;
+mod markdown;
 mod names;
 mod parse;
 mod read;
@@ -42,6 +43,7 @@ mod rust;
 mod section;
 mod shipped;
 mod string;
+mod thinned;
 mod toml_value;
 mod write;
 

@@ -124,7 +124,8 @@ impl Record {
     /// gains speed; it biases nothing. What varies faster than the new samples can follow is another matter: in an input
     /// the model never sees it, and an output that depends on the input at once (a feed-through) sees the mean. Choose `n`
     /// small against the fastest time constant. An output that is measured only now and then may be lost altogether:
-    /// [`coverage`](Record::coverage) tells. Not for discrete models, whose step is one sample.
+    /// [`coverage`](Record::coverage) tells. Not for models of which each sample is
+    /// a step: discrete ones, and those whose samples change states ([`Model::jump`](crate::Model::jump)).
     ///
     /// # Errors
     /// `n` of zero, or too few samples left.

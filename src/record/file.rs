@@ -1,5 +1,6 @@
 //! [`DataFile`]: from a file to a record, and from a record to a CSV file.
 
+mod bytes;
 #[cfg_attr(not(all(feature = "arrow", feature = "mat", feature = "npz")), allow(dead_code))]
 mod columns;
 mod dates;
@@ -77,7 +78,8 @@ use std::path::{Path, PathBuf};
 /// `factor * cell + offset`, in the unit of the signal. Where the file says a unit that is known and not the signal's (rpm for rad/s, mA for
 /// A), it is refused until a [`unit`](DataFile::unit) or a [`factor`](DataFile::factor) is given; nothing is converted unasked.
 ///
-/// **Cells** stand between commas, semicolons, tabs, bars or single spaces, may be quoted, and may have white space around them. Numbers
+/// **Cells** stand between commas, semicolons, tabs, bars or runs of spaces, may be quoted, and may have white space around them. Letters
+/// are UTF-8, or else Windows-1252, of which Latin-1 is a part. Numbers
 /// have a point or a comma, the same in the whole file. An output that was not measured is empty, `NaN`, `NA` or `null`; inputs and time
 /// are always there, unless an input has a rate of its own and is to be [filled in](DataFile::fill).
 ///
@@ -194,7 +196,7 @@ impl DataFile {
     }
 
     /// Unit of the cells of `signal`, whatever the file says: they are converted to the signal's. `unit("w", "rpm")` multiplies by 0.1047 for
-    /// `rad/s`; `unit("temp", "degF")` for `degC` subtracts 32 first.
+    /// `rad/s`; `unit("temp", "degF")` for `degC` subtracts 32 first, beside which there is no offset.
     pub fn unit(self, signal: &str, unit: &str) -> Self {
         self.with(signal, |column| column.unit = Some(unit.to_owned()))
     }

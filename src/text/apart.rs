@@ -44,8 +44,24 @@ impl Model {
         let wrong = |remark: Remark| Error::Wrong(vec![remark]);
         let (nodes, _) = parse(text).map_err(|no| wrong(Remark::error(&source, no.at, no.title).help(no.help)))?;
         let expression = Expression { text: text.to_owned(), nodes, place: Place::plain(0..text.len()) };
-        let mut compiler = Compiler::new(&self.document, &self.source).map_err(Error::Wrong)?.reading(&source);
+        let mut compiler = Compiler::new(&self.document, &self.source).map_err(Error::Wrong)?;
         compiler.names.extend(names);
+        let may = |meaning: &Meaning| match *meaning {
+            Meaning::Time => allowed(Leaf::Time),
+            Meaning::Input(i) => allowed(Leaf::Input(i)),
+            Meaning::Parameter(i) => allowed(Leaf::Parameter(i)),
+            Meaning::State(i) => allowed(Leaf::State(i)),
+            Meaning::Measured(i) => allowed(Leaf::Measured(i)),
+            Meaning::Item(item) => item < self.document.constants.len(),
+            Meaning::Table(_) => true,
+            Meaning::Number(_) => false,
+        };
+        let mut usable: Vec<&str> =
+            compiler.names.iter().filter(|(_, meaning)| may(meaning)).map(|(name, _)| *name).collect();
+        usable.sort_unstable();
+        let sentence = format!("{what} may use {of}");
+        let help = format!("{sentence}: {}", usable.join(", "));
+        let mut compiler = compiler.reading(&source, &sentence, usable);
         let Some(root) = compiler.lower(&expression) else { return Err(Error::Wrong(compiler.errors)) };
         let (graph, roots) = compiler.graph.pruned(&[root]);
         let stranger = graph.nodes().iter().find_map(|node| match node {
@@ -56,7 +72,7 @@ impl Model {
             (None, Some(root)) => Ok((graph, *root)),
             _ => {
                 let title = format!("{what} depends on other things than {of}");
-                Err(wrong(Remark::error(&source, 0..text.len(), title)))
+                Err(wrong(Remark::error(&source, 0..text.len(), title).help(help)))
             }
         }
     }

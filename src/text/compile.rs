@@ -83,6 +83,8 @@ pub(super) struct Compiler<'d> {
     items: Vec<Option<Id>>,
     pub graph: Graph,
     pub errors: Vec<Remark>,
+    /// What an expression apart from the file may use, in a sentence, and the names of it.
+    apart: Option<(String, Vec<&'d str>)>,
 }
 
 impl<'d> Compiler<'d> {
@@ -92,7 +94,7 @@ impl<'d> Compiler<'d> {
         let order = order(document, &names, source).map_err(|circle| vec![circle])?;
         let expressions = items(document);
         let (items, graph, errors) = (vec![None; expressions.len()], Graph::default(), vec![]);
-        let mut compiler = Compiler { document, source, names, items, graph, errors };
+        let mut compiler = Compiler { document, source, names, items, graph, errors, apart: None };
         for item in order {
             let set = document.constants.get(item).and_then(|constant| constant.set);
             let id = match set {
@@ -111,9 +113,9 @@ impl<'d> Compiler<'d> {
         }
     }
 
-    /// This compiler for expressions of another text.
-    pub fn reading(self, source: &'d Arc<Source>) -> Self {
-        Compiler { source, ..self }
+    /// This compiler for expressions of another text, which may use what the sentence says, of these names.
+    pub fn reading(self, source: &'d Arc<Source>, sentence: &str, names: Vec<&'d str>) -> Self {
+        Compiler { source, apart: Some((sentence.to_owned(), names)), ..self }
     }
 
     /// The value of a constant, by its number.
@@ -268,12 +270,16 @@ impl<'d> Compiler<'d> {
         if function(name).is_some() {
             return (format!("`{name}` is a function"), Some(format!("call it with its argument: {name}(x)")));
         }
-        let near = nearest(name, self.names.keys().copied());
-        let help = match near {
-            Some(near) => Some(format!("did you mean `{near}`?")),
-            None => Some("declare it under [constants], [inputs], [parameters], [states] or [let]".to_owned()),
+        let near = match &self.apart {
+            Some((_, names)) => nearest(name, names.iter().copied()),
+            None => nearest(name, self.names.keys().copied()),
         };
-        (format!("nothing is called `{name}`"), help)
+        let help = match (near, &self.apart) {
+            (Some(near), _) => format!("did you mean `{near}`?"),
+            (None, Some((sentence, names))) => format!("{sentence}: {}", names.join(", ")),
+            (None, None) => "declare it under [constants], [inputs], [parameters], [states] or [let]".to_owned(),
+        };
+        (format!("nothing is called `{name}`"), Some(help))
     }
 
     fn binary(&mut self, sign: Sign, a: Id, b: Id) -> Id {

@@ -5,10 +5,10 @@ use crate::unit::{NoUnit, Relation, Unit, relation};
 use std::collections::BTreeMap;
 
 /// How many of the unit `to` one of the unit `from` is: `factor("rpm", "rad/s")` is 0.1047. Of degrees Celsius it is that of
-/// their differences; a frequency that stands for an angular velocity counts revolutions.
+/// their differences; a frequency in `Hz` that stands for an angular velocity counts revolutions.
 ///
 /// # Errors
-/// A text that is no unit, units of different dimensions.
+/// A text that is no unit, units of different dimensions, a plain rate such as `1/min` for an angular velocity.
 ///
 /// ```
 /// use greybox::text::factor;
@@ -21,6 +21,11 @@ pub fn factor(from: &str, to: &str) -> Result<f64, Error> {
     match relation(from, to) {
         Relation::Factor(factor) | Relation::OtherZero { factor, .. } => return Ok(factor),
         Relation::Same => return Ok(1.0),
+        Relation::Ambiguous { .. } => {
+            return Err(Error::Unit(format!(
+                "`{from}` may count revolutions or radians of `{to}`: write the unit with `rev` or `rad`, as `rev/min`"
+            )));
+        }
         _ => {}
     }
     let read = |text: &str| {

@@ -74,6 +74,13 @@ pub(super) fn known(symbol: &str) -> Option<Unit> {
     PREFIXES.iter().find_map(with)
 }
 
+/// A symbol and, where prefixes go with it, each with a prefix, and its size in units of the symbol.
+pub(super) fn with_prefixes(symbol: &str) -> impl Iterator<Item = (String, f64)> {
+    let takes = UNITS.iter().any(|known| known.1 && known.0 == symbol);
+    let prefixes = PREFIXES.iter().filter(move |_| takes);
+    [("", 1.0)].iter().chain(prefixes).map(move |(prefix, size)| (format!("{prefix}{symbol}"), *size))
+}
+
 fn unit((_, _, factor, powers): &Known, prefix: f64) -> Unit {
     let powers = BASES.iter().zip(powers).filter(|(_, power)| **power != 0);
     let powers = powers.map(|(base, power)| ((*base).to_owned(), f64::from(*power))).collect();

@@ -73,7 +73,7 @@ fn not_a_number() {
     let thousands = DataFile::new(file("thousands.csv", "t;ud;w;id;iq\n0;1.234,5;2;3;4\n"));
     says(thousands.decimal_comma().read(&Pmsm), &["line 2", "`1.234,5`", "separators of thousands"]);
     let latin = Experiment::from_file(&Pmsm, file("latin.csv", b"t,ud,w,F\xfcllstand,iq\n0,1,2,3,4\n"));
-    says(latin, &["no column `id`", "not UTF-8"]);
+    says(latin, &["no column `id`", "Füllstand"]);
     let long = DataFile::new(file("long.csv", format!("t;ud;w;id;iq\n0;{};2;3;4\n", "1".repeat(65))));
     says(long.decimal_comma().read(&Pmsm), &["line 2", "`ud`"]);
 }

@@ -127,3 +127,22 @@ fn daylight_saving_is_followed_or_named() {
     says(lost.read(&Pmsm), &["line 2", "no such time in the zone"]);
     says(spring().zone("Middle/Earth").read(&Pmsm), &["DataFile::zone(\"Middle/Earth\")"]);
 }
+
+/// What is said of numbers has no effect on dates, and the other way round.
+#[test]
+fn options_without_effect() {
+    let dates = || file("with_dates", "t", &["2025-03-20 14:00", "2025-03-20 14:01"]);
+    let refused = [
+        (dates().unit("t", "min"), "DataFile::unit"),
+        (dates().factor("t", 60.0), "DataFile::factor"),
+        (dates().offset("t", 1.0), "DataFile::offset"),
+        (dates().reversed("t"), "DataFile::reversed"),
+        (file("with_clocks", "t", &["14:00:00", "14:00:01"]).factor("t", 60.0), "DataFile::factor"),
+    ];
+    for (file, option) in refused {
+        says(file.read(&Pmsm), &["column `t` has dates", option, "has no effect"]);
+    }
+    let numbers = || file("with_numbers", "t", &["0", "1"]);
+    says(numbers().zone("Europe/Berlin").read(&Pmsm), &["column `t`", "DataFile::zone has no effect"]);
+    says(numbers().dates(DateOrder::DayFirst).read(&Pmsm), &["column `t`", "DataFile::dates has no effect"]);
+}

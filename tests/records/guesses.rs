@@ -61,6 +61,22 @@ fn a_file_is_read_as_it_stands() {
             "cells between \",\", a row of units, time \"t\" in s; `w` in \"1\" taken as \"rad/s\"",
         ),
         (
+            "units_row_beside_remarks",
+            plain
+                .replace("t,", "note,t,")
+                .replace("iq\n", "iq\n,s,V,1,A,A\n")
+                .replace("\n0,", "\nbegin,0,")
+                .replace("\n1,", "\n,1,")
+                .replace("\n2,", "\n,2,"),
+            "cells between \",\", a row of units, time \"t\" in s; `w` in \"1\" taken as \"rad/s\"",
+        ),
+        (
+            "aligned",
+            format!("\n  {}", plain.replace(",,", ",nan,").replace(',', "    ").replace('\n', "  \r\n   ")),
+            "cells between spaces, 1 line above the names, time \"t\" in s",
+        ),
+        ("spaces_around", plain.replace(',', " ,  "), "cells between \",\", time \"t\" in s"),
+        (
             "indexes_in_names",
             plain.replace("t,ud,w,id,iq", "t,ud[1],w(t),id(2),iq"),
             "cells between \",\", time \"t\" in s; `ud` in \"1\" taken as \"V\"; `w` in \"t\" taken as \"rad/s\"; `id` in \"2\" taken as \"A\"",
@@ -112,6 +128,50 @@ fn a_file_is_read_as_it_stands() {
     }
 }
 
+/// A row whose time is a number is a sample, whatever stands in it; a text in a column of no signal is no unit.
+#[test]
+fn the_first_sample_is_no_row_of_units() {
+    let record = read("remarks", "t,ud,w,id,iq,event\n1,1,1,1,1,start\n2,2,4,1,1,0\n3,3,6,1,1,0\n");
+    assert_eq!((record.len(), record.time(0), record.input(0)), (3, 1.0, Drive { ud: 1.0, w: 1.0 }));
+    let record = DataFile::new(file("remarks_alone", "ud,w,id,iq,event\n1,1,1,1,start\n2,4,1,1,0\n3,6,1,1,0\n"));
+    assert_eq!(record.sample_time(0.5).read(&Pmsm).unwrap().len(), 3);
+    let texts = file("texts", "t,ud,w,id,iq\n0,a,b,c,d\n1,1,2,3,4\n");
+    says(DataFile::new(texts).read(&Pmsm), &["line 2", "`ud`", "`a`"]);
+}
+
+/// Runs of spaces are one separator; lines are counted as they stand.
+#[test]
+fn aligned_columns() {
+    let text = "   t      ud    w     id    iq\n\n   0.0    1.0   2.0   3.0   4.0\n\n  10.0   -1.0   x     3.0   4.0\n";
+    says(DataFile::new(file("aligned_text", text)).read(&Pmsm), &["line 5", "`w`", "`x`"]);
+    let row = "t ud  w id iq\n0  1  2  3  4\n1  1     3  4\n";
+    says(DataFile::new(file("aligned_hole", row)).read(&Pmsm), &["line 3", "4 cell(s)", "5 column(s)"]);
+    // The clock turns uneven, so that the file is read again.
+    let record = read("aligned_uneven", "t ud   w id iq\n 0 1  2  3  4\n  1  1 2  3 4\n5 1 2 3 4\n");
+    assert_eq!(record.times(), &Time::Stamps(vec![0.0, 1.0, 5.0]));
+}
+
+/// Letters of Latin-1 are read as those, so that degrees Fahrenheit are not taken for other degrees.
+#[test]
+fn letters_of_latin_1() {
+    let bytes = |text: &str| text.chars().map(|letter| u8::try_from(u32::from(letter)).unwrap()).collect::<Vec<u8>>();
+    let mut layout = Layout::of::<Pmsm>();
+    layout.outputs[0].unit = "degC".to_owned();
+    let warm = file("latin_units", bytes("Zeit (µs);ud;w;id [°F];iq\n0;1;2;32;4\n500;1;2;212;4\n"));
+    let warm = DataFile::new(warm);
+    says(warm.read_record(&layout), &["column `id [°F]`", "their zeros differ"]);
+    let record = warm.unit("id", "°F").read_record(&layout).unwrap();
+    assert_eq!(record.time(1), 5e-4);
+    // Water boils at 100 degrees, up to the rounding of 459.67 F.
+    assert!((record.outputs()[0].values[1] - 100.0).abs() < 1e-12);
+    let shown = record.reading().unwrap().to_string();
+    assert_eq!(shown, "cells between \";\", letters of Windows-1252, time \"Zeit (µs)\" in us");
+    // A letter that was lost before makes the unit unknown.
+    let lost = DataFile::new(file("lost_letter", "t,ud,w,id [\u{fffd}F],iq\n0,1,2,32,4\n1,1,2,212,4\n"));
+    let shown = lost.read_record(&layout).unwrap().reading().unwrap().to_string();
+    assert!(shown.ends_with("`id` in \"\u{fffd}F\" taken as \"degC\""), "{shown}");
+}
+
 /// A decimal comma that first shows after thousands of rows; the clock turns uneven there, too, so that the file is read again.
 #[test]
 fn a_decimal_comma_may_show_late() {
@@ -129,6 +189,11 @@ fn a_column_in_another_unit_is_refused() {
         ("t,ud [mV],w,id,iq", "ud [mV]", "DataFile::factor(\"ud\", 0.001)"),
         ("t,ud,w,id (kA),iq", "id (kA)", "DataFile::factor(\"id\", 1000)"),
         ("t,ud,w [Hz],id,iq", "w [Hz]", "DataFile::factor(\"w\", 6.283185307179586)"),
+        (
+            "t,ud,w [1/s],id,iq",
+            "w [1/s]",
+            "6.283185307179586) if it counts revolutions, or DataFile::factor(\"w\", 1) if",
+        ),
         ("t,ud,w [V],id,iq", "w [V]", "neither is a multiple of the other"),
         ("t,ud [N m],w,id,iq", "ud [N m]", "DataFile::factor(\"ud\", 1) if the file's unit is wrong"),
     ] {
@@ -170,12 +235,20 @@ fn a_unit_that_is_said_converts() {
     let shifted = read("K").offset("temp", -273.15).read_record(&layout("degC")).unwrap();
     assert_eq!(shifted.outputs()[0].values[0], 300.0 - 273.15);
     // A degree Fahrenheit is smaller.
-    says(read("degF").offset("temp", -17.8).read_record(&layout("degC")), &["their zeros differ"]);
+    let offset = || read("degF").offset("temp", -17.8);
+    let without = ["offset of -17.8", "give DataFile::unit(\"temp\", \"degF\")", "leave out DataFile::offset"];
+    says(offset().read_record(&layout("degC")), &without);
+    // The conversion has the offset already.
+    says(offset().unit("temp", "degF").read_record(&layout("degC")), &without);
     let path = file("said_units", "t,ud,w,id,iq\n0,1,60,3,4\n1000,1,60,3,4\n");
     let drive = || DataFile::new(&path);
     let record = drive().unit("w", "rpm").unit("t", "ms").read(&Pmsm).unwrap();
     assert!((record.input(0).w / std::f64::consts::TAU - 1.0).abs() < 1e-15 && record.time(1) == 1.0);
     says(drive().unit("w", "V").read(&Pmsm), &["column `w` is in \"V\"", "neither is a multiple"]);
+    // Revolutions or radians: nobody knows.
+    let plain =
+        ["DataFile::factor(\"w\", 0.10471975511965977) if it counts revolutions", "0.016666666666666666) if radians"];
+    says(drive().unit("w", "1/min").read(&Pmsm), &plain);
     says(drive().unit("w", "ticks").read(&Pmsm), &["is not known: give DataFile::factor(\"w\", ..)"]);
     says(drive().unit("w", "rpm").factor("w", 2.0).read(&Pmsm), &["a factor, 2, and a unit, rpm"]);
 }

@@ -89,6 +89,8 @@ fn lengths_of_time_take_an_offset_but_no_factor() {
     let file = arrow("lengths.arrow", Arc::new(DurationMillisecondArray::from(vec![0, 500, 1000])));
     let moved = read(&file.clone().offset("t", 2.0)).unwrap();
     assert_eq!(moved.times(), &Time::Uniform { start: 2.0, step: 0.5 });
+    says(read(&file.clone().unit("t", "ms")), &["the unit of `t`", "holds lengths of time", "give none"]);
+    says(read(&file.clone().zone("UTC")), &["column `time`", "no dates", "DataFile::zone"]);
     says(read(&file.factor("t", 1e-3)), &["the factor of `t`", "column `time` holds lengths of time", "give none"]);
 }
 

@@ -4,6 +4,7 @@ mod exported;
 mod fuzz;
 mod meaning;
 mod noise;
+mod readers;
 mod twins;
 mod units;
 mod wrong;

@@ -2,8 +2,9 @@
 
 use greybox::graph::Leaf;
 use greybox::layout::{Kind, Quantity};
+use greybox::record::{Channel, Initial, Record};
 use greybox::text::Model;
-use greybox::{Hold, fixed, free, record::Initial};
+use greybox::{Error, Hold, Time, fixed, free};
 
 pub const PMSM: &str = r#"
 greybox = 1
@@ -243,6 +244,31 @@ fn states_that_jump() {
     let warned = model(&text.replace("x + dose", "x + dose*a"));
     let warned = warned.warnings().iter().map(|one| one.title().to_owned()).collect::<Vec<_>>();
     assert!(warned.iter().any(|title| title.contains("V") && title.contains("V/s")), "{warned:?}");
+}
+
+/// Every sample of a discrete model or of one with `jump` is a step of it: fewer samples would be another plant.
+#[test]
+fn records_are_thinned_where_the_plant_stays() {
+    let thinned = |state: &str, n: usize| {
+        let text =
+            "greybox = 1\n[inputs]\nu = \"\"\n[parameters]\na = { start = 1 }\n[outputs]\ny = \"x\"\n[states]\nx = ";
+        let model = model(&format!("{text}{{ {state} }}"));
+        let channel = |name: &str, k: f64| Channel::new(name, "", (0..6).map(|i| k * f64::from(i)).collect::<Vec<_>>());
+        let states = model.equations().layout().states.clone();
+        let time = Time::Uniform { start: 0.0, step: 1.0 };
+        let record = Record::new(states, time, vec![channel("u", 1.0)], vec![channel("y", 2.0)]).unwrap();
+        model.thinned(&record, n).map(|record| record.outputs()[0].values.to_vec())
+    };
+    assert_eq!(thinned("derivative = \"-a*x + u\"", 2).unwrap(), [0.0, 4.0, 8.0]);
+    for (state, why) in
+        [("next = \"a*x + u\"", "the model is discrete"), ("jump = \"x + u\"", "samples change state `x`")]
+    {
+        let error = thinned(state, 2).unwrap_err();
+        assert!(matches!(error, Error::Thinned { every: 2, .. }), "{error}");
+        let said = error.to_string();
+        assert!(said.contains(why) && said.contains("Record::decimate(2)") && said.contains("resample"), "{said}");
+        assert_eq!(thinned(state, 1).unwrap().len(), 6);
+    }
 }
 
 /// A constant that is set has its new value in the equations and in the file; comments stay.

@@ -135,6 +135,9 @@ fn each_mistake_in_a_table_has_its_message() {
         let error = Model::named("model.toml", &table(&text)).unwrap_err();
         assert_eq!(error.remarks()[0].title(), title, "{error}");
     }
+    let error = Model::named("model.toml", &table("x = [0, 1]\nvalues = [0, 1]")).unwrap_err();
+    let remedy = error.remarks()[0].remedy().unwrap();
+    assert!(["outside = \"hold\"", "\"linear\""].iter().all(|value| remedy.contains(value)), "{remedy}");
 }
 
 /// All mistakes are shown, each with its line and a caret.
@@ -190,4 +193,16 @@ fn expressions_apart() {
     let error = model.derived("ls/rr").unwrap_err();
     assert_eq!((error.remarks()[0].title(), error.remarks()[0].column()), ("nothing is called `rr`", 4));
     assert_eq!(model.derived("ls/w").unwrap_err().remarks().len(), 1);
+    // What may be used is said, not where to declare it.
+    let weight = "a weight may use time, inputs and measured outputs: id, iq, np, t, ud, uq, w";
+    let derived = "a derived quantity may use parameters and constants: ke, ls, np, rs";
+    for (error, title, help) in [
+        (model.weight("foo"), "nothing is called `foo`", weight),
+        (model.weight("rs*w"), "a weight depends on other things than time, inputs and measured outputs", weight),
+        (model.derived("foo"), "nothing is called `foo`", derived),
+        (model.derived("speed"), "nothing is called `speed`", derived),
+    ] {
+        let error = error.unwrap_err();
+        assert_eq!((error.remarks()[0].title(), error.remarks()[0].remedy()), (title, Some(help)));
+    }
 }

@@ -240,6 +240,7 @@ impl DataFile {
             decimal_comma: false,
             preamble: 0,
             units_row: false,
+            windows: false,
             time: source,
             units: plan.units.clone(),
             filled: vec![],

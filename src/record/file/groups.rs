@@ -1,5 +1,6 @@
 //! Files with many records, which a column tells apart.
 
+use super::bytes::decoded;
 use super::columns::{self, Cells};
 use super::read::Rows;
 use super::{Column, DataFile};
@@ -67,7 +68,7 @@ impl DataFile {
         let mut places = Places::default();
         let mut groups: Groups<Rows> = vec![];
         while table.next()? {
-            let key = String::from_utf8_lossy(table.cell(at));
+            let key = decoded(table.cell(at));
             let place = places.of(self, &key, by, &mut groups, || Rows::new(&plan));
             if let Ok(rows) = &mut groups[place].1
                 && let Err(error) = rows.push(self, &plan, &table, &mut numbers, true)

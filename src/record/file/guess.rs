@@ -1,12 +1,19 @@
 //! Guesses at a text file from its first lines, as a person would make them: what stands between cells, which line has the names,
 //! whether units stand below it.
 
+use super::bytes::{Spaces, decoded};
+use super::reading::time_unit;
 use super::stamp::Stamp;
 use super::{DataFile, is_missing};
 use crate::error::Error;
+use crate::unit::Unit;
+use std::collections::BTreeMap;
 
 /// What stands between cells, the likelier first.
 const SEPARATORS: [u8; 5] = [b',', b';', b'\t', b'|', b' '];
+
+/// What stands around units.
+const BRACKETS: [char; 4] = ['[', ']', '(', ')'];
 
 /// Lines that are looked at.
 const LOOKED_AT: usize = 200;
@@ -18,6 +25,8 @@ pub(super) struct Form {
     pub(super) names: Vec<String>,
     /// Units below the names.
     pub(super) units: Option<Vec<String>>,
+    /// Names or units are no UTF-8, and were read as Windows-1252.
+    pub(super) windows: bool,
     /// Lines above the names.
     pub(super) preamble: usize,
     /// Lines above the first row.
@@ -64,7 +73,8 @@ impl Form {
         }
         let forms: Vec<Form> =
             separators.iter().map(|separator| Form::under(file, *separator, &lines, remark.as_ref(), wanted)).collect();
-        let complete = forms.iter().filter(|form| form.has(wanted)).max_by_key(|form| form.names.len());
+        let complete = forms.iter().filter(|form| form.has(wanted) && !form.is_of_another(file));
+        let complete = complete.max_by_key(|form| form.names.len());
         let likeliest = || forms.iter().rev().max_by_key(|form| form.score(file, &lines));
         Ok(complete.or_else(likeliest).cloned().unwrap_or_else(|| forms[0].clone()))
     }
@@ -77,6 +87,7 @@ impl Form {
                 separator,
                 names,
                 units: None,
+                windows: std::str::from_utf8(line.text).is_err(),
                 preamble: line.number,
                 skipped: lines.get(at).map_or(line.number + 1, |l| l.number),
             }
@@ -93,20 +104,13 @@ impl Form {
         let (at, mut found) = found.unwrap_or((0, first));
         if let Some(below) = lines.get(at + 1) {
             let units = cells(file, separator, below.text);
-            let of_wanted = |cell: &(&String, &String)| wanted.iter().any(|want| names(cell.1, want));
-            let texts = |cells: &[String]| {
-                let mut among = cells.iter().zip(&found.names).filter(of_wanted).map(|(cell, _)| cell).peekable();
-                among.peek().is_some() && among.all(|cell| !cell.is_empty() && !is_value(cell))
-            };
             let after = lines.get(at + 2).map(|line| cells(file, separator, line.text));
-            // The unit of a ratio is written `1`; every other cell of such a row is a text above a number.
-            let above = |(unit, below): (&String, &String)| unit == "1" || !is_value(unit) && is_value(below);
-            let units_and_ones =
-                |after: &[String]| units.iter().any(|unit| unit != "1") && units.iter().zip(after).all(above);
-            let is_row = |after: Vec<String>| !texts(&after) && (texts(&units) || units_and_ones(&after));
-            let guessed = units.len() == found.names.len() && !wanted.is_empty() && after.is_some_and(is_row);
+            let guessed = units.len() == found.names.len()
+                && !wanted.is_empty()
+                && after.is_some_and(|after| are_units(file, &found.names, wanted, &units, &after));
             if file.units_row || guessed {
                 found.units = Some(units);
+                found.windows |= std::str::from_utf8(below.text).is_err();
                 found.skipped = lines.get(at + 2).map_or(below.number + 1, |line| line.number);
             }
         }
@@ -115,11 +119,17 @@ impl Form {
 
     /// The unit below the name of a column.
     pub(super) fn unit(&self, column: usize) -> Option<&str> {
-        Some(self.units.as_ref()?.get(column)?.trim_matches(['[', ']', '(', ')']))
+        Some(self.units.as_ref()?.get(column)?.trim_matches(BRACKETS))
     }
 
     fn has(&self, wanted: &[&str]) -> bool {
         !wanted.is_empty() && wanted.iter().all(|want| self.names.iter().any(|name| names(name, want)))
+    }
+
+    /// Whether spaces were taken for what stands between cells, where another sign stands there and spaces stand around it.
+    fn is_of_another(&self, file: &DataFile) -> bool {
+        let other = |name: &String| name.is_empty() || name.contains([',', ';', '|', '\t']);
+        self.separator == b' ' && file.separator.is_none() && self.names.iter().any(other)
     }
 
     /// How many cells of the lines below the names are values, in lines with as many cells as there are names.
@@ -132,6 +142,36 @@ impl Form {
         // Without a row below, the number of names decides.
         rows.flatten().filter(|cell| is_value(cell)).count() * 1000 + self.names.len()
     }
+}
+
+/// Whether cells between the names and a row are units. Only the columns of time and of signals tell: a text in another is a remark, and a row whose time
+/// is a number is a sample.
+fn are_units(file: &DataFile, names_of_file: &[String], wanted: &[&str], units: &[String], after: &[String]) -> bool {
+    let time = file.time_column(names_of_file).ok();
+    let is_number = |cell: &String| !is_missing(cell.as_bytes()) && is_value(cell);
+    if time.and_then(|at| units.get(at)).is_some_and(is_number) {
+        return false;
+    }
+    let signals: Vec<usize> =
+        (0..names_of_file.len()).filter(|at| wanted.iter().any(|want| names(&names_of_file[*at], want))).collect();
+    let texts = |cells: &[String]| {
+        let text = |at: &usize| cells.get(*at).is_some_and(|cell| !cell.is_empty() && !is_value(cell));
+        !signals.is_empty() && signals.iter().all(text)
+    };
+    // The unit of a ratio is written `1`; every other cell of such a row is a unit above a number.
+    let above =
+        |at: usize| units[at] == "1" || !is_value(&units[at]) && after.get(at).is_some_and(|cell| is_value(cell));
+    let ones = || {
+        let told: Vec<usize> = signals.iter().copied().chain(time).collect();
+        told.iter().any(|at| is_unit(&units[*at])) && told.iter().all(|at| above(*at))
+    };
+    !texts(after) && (texts(units) || ones())
+}
+
+/// Whether a cell has a unit that is known, or one in brackets.
+fn is_unit(cell: &str) -> bool {
+    let plain = cell.trim_matches(BRACKETS);
+    !is_value(cell) && (plain != cell || time_unit(plain).is_some() || Unit::read(plain, &BTreeMap::new()).is_ok())
 }
 
 /// Whether a column of this name holds what is wanted: the name itself, or the name with a unit behind it.
@@ -167,7 +207,8 @@ fn trimmed(mut line: &[u8]) -> &[u8] {
 /// The cells of one line.
 pub(super) fn cells(file: &DataFile, separator: u8, line: &[u8]) -> Vec<String> {
     let mut record = csv::ByteRecord::new();
+    let line = Spaces::new(separator, line);
     // A line in memory is read without an error.
     let _ = super::table::format(file, separator).from_reader(line).read_byte_record(&mut record);
-    record.iter().map(|cell| String::from_utf8_lossy(cell.trim_ascii()).into_owned()).collect()
+    record.iter().map(|cell| decoded(cell.trim_ascii()).into_owned()).collect()
 }

@@ -1,5 +1,6 @@
 //! Reading: a file's columns become a record, those of a text row by row.
 
+use super::bytes::decoded;
 use super::columns;
 use super::guess::{names, split_unit};
 use super::numbers::Numbers;
@@ -220,9 +221,16 @@ impl DataFile {
             match (relation(file, model), said.unit.is_some()) {
                 (Relation::Same, _) => {}
                 (Relation::Factor(found), true) => factor = found,
-                (Relation::OtherZero { factor: found, shift }, true) => (factor, offset) = (found, offset + shift),
                 // An offset was said, and kelvins are as large as degrees Celsius.
                 (Relation::OtherZero { factor, .. }, false) if factor == 1.0 && offset != 0.0 => {}
+                (Relation::OtherZero { .. }, _) if offset != 0.0 => {
+                    let name = &signal.name;
+                    return Err(Error::Option(format!(
+                        "the cells of `{name}` are in {file}, whose zero is not that of {model}, and an offset of {offset} was given: give \
+                         DataFile::unit(\"{name}\", \"{file}\"), which has the zero, and leave out DataFile::offset"
+                    )));
+                }
+                (Relation::OtherZero { factor: found, shift }, true) => (factor, offset) = (found, shift),
                 (Relation::Unknown, false) => {
                     if !file.is_empty() {
                         units.push((signal.name.clone(), file.to_owned(), signal.unit.clone()));
@@ -248,7 +256,7 @@ impl DataFile {
     ) -> Error {
         let Some(value) = value else {
             let (path, line, name) = (self.path.clone(), table.line(), table.names()[column].clone());
-            let text = String::from_utf8_lossy(table.cell(column)).into_owned();
+            let text = decoded(table.cell(column)).into_owned();
             return Error::NotANumber { path, line, column: name, text };
         };
         let (experiment, signal) = (self.name(), signal.to_owned());
@@ -312,6 +320,7 @@ impl Rows {
             decimal_comma: numbers.comma(),
             preamble: form.preamble as u64,
             units_row: form.units.is_some(),
+            windows: form.windows,
             time: source,
             units: plan.units.clone(),
             filled: vec![],

@@ -18,6 +18,8 @@ pub struct Reading {
     pub preamble: u64,
     /// Whether a row of units was skipped.
     pub units_row: bool,
+    /// Whether names or units are no UTF-8 and were read as Windows-1252.
+    pub windows: bool,
     /// Where time comes from.
     pub time: TimeSource,
     /// Signals for which the file has another unit than the model, one of them unknown: name, the file's unit, the model's. They
@@ -86,6 +88,9 @@ impl fmt::Display for Reading {
         }
         if self.units_row {
             write!(f, "a row of units, ")?;
+        }
+        if self.windows {
+            write!(f, "letters of Windows-1252, ")?;
         }
         write!(f, "{}", self.time)?;
         for (signal, file, model) in &self.units {

@@ -5,6 +5,7 @@
 //! record is always the one before the reader's position.
 
 use super::DataFile;
+use super::bytes::Spaces;
 use super::guess::Form;
 use crate::error::Error;
 use std::fs::File;
@@ -19,7 +20,7 @@ const LONGEST: u64 = 1 << 24;
 /// Lines that are wanted among them besides remarks.
 const LINES: usize = 3;
 
-type Bytes = Chain<Chain<Cursor<Vec<u8>>, File>, &'static [u8]>;
+type Bytes = Spaces<Chain<Chain<Cursor<Vec<u8>>, File>, &'static [u8]>>;
 
 /// The rows of an open file.
 pub(super) struct Table {
@@ -57,7 +58,7 @@ impl Table {
         let mut ends = head.iter().enumerate().filter(|(_, byte)| **byte == b'\n').map(|(at, _)| at + 1);
         let begin = if form.skipped == 0 { 0 } else { ends.nth(form.skipped - 1).unwrap_or(head.len()) };
         let rows = Cursor::new(head.split_off(begin)).chain(bytes).chain(NEWLINE);
-        let rows = format(file, form.separator).buffer_capacity(1 << 16).from_reader(rows);
+        let rows = format(file, form.separator).buffer_capacity(1 << 16).from_reader(Spaces::new(form.separator, rows));
         Table { path: file.path.clone(), form, rows, row: csv::ByteRecord::new() }
     }
 

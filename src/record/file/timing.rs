@@ -1,12 +1,13 @@
 //! [`Timing`]: the time of each row, from a column of numbers, from one of dates, or from a constant step.
 
+use super::bytes::decoded;
 use super::dates::Dates;
 use super::guess::split_unit;
 use super::numbers::Numbers;
 use super::reading::{of_size, time_unit};
 use super::stamp::Stamp;
 use super::table::Table;
-use super::{DataFile, TimeSource};
+use super::{Column, DataFile, TimeSource};
 use crate::error::Error;
 use crate::numeral::{Moment, TimeUnit};
 use crate::record::{Clock, Time};
@@ -105,6 +106,7 @@ impl DataFile {
         first: f64,
     ) -> Result<Option<Ticks>, Error> {
         let (name, said) = (&names[column], self.said("t"));
+        self.no_dates(name)?;
         if name.is_empty() && said.name.is_none() {
             return self.place(names, "t").map(|_| None);
         }
@@ -130,8 +132,35 @@ impl DataFile {
         Ok(Some(Ticks { column, unit, shown, offset: said.offset, origin }))
     }
 
+    /// Refuses what was said of dates, of a column of time that has none.
+    pub(super) fn no_dates(&self, column: &str) -> Result<(), Error> {
+        let said = self.zone.as_ref().map(|_| "DataFile::zone").or(self.dates.map(|_| "DataFile::dates"));
+        let refused = |option| {
+            Err(Error::Option(format!(
+                "column `{column}` has times that are no dates, so that {option} has no effect: leave it out"
+            )))
+        };
+        said.map_or(Ok(()), refused)
+    }
+
+    /// Refuses what was said of numbers, of a column of time that has dates or times of day.
+    fn no_numbers(&self, column: &str) -> Result<(), Error> {
+        let said = self.said("t");
+        let option = match &said {
+            Column { factor: Some(_), .. } => "DataFile::factor",
+            Column { unit: Some(_), .. } => "DataFile::unit",
+            Column { reversed: true, .. } => "DataFile::reversed",
+            Column { offset, .. } if *offset != 0.0 => "DataFile::offset",
+            _ => return Ok(()),
+        };
+        Err(Error::Option(format!(
+            "column `{column}` has dates or times of day, whose unit is known, so that {option} of `t` has no effect: leave it out"
+        )))
+    }
+
     /// Dates in a column, in the order and the zone that were said.
-    pub(super) fn dates_of(&self) -> Result<Dates, Error> {
+    pub(super) fn dates_of(&self, column: &str) -> Result<Dates, Error> {
+        self.no_numbers(column)?;
         let zone = self.zone.as_ref().map(|zone| {
             TimeZone::get(zone).map_err(|error| Error::Option(format!("DataFile::zone(\"{zone}\"): {error}")))
         });
@@ -155,13 +184,17 @@ impl DataFile {
             let stamps = if kept || !self.path.is_file() { Some(Vec::new()) } else { None };
             return Ok(Timing::Numbers { ticks, clock: Clock::default(), stamps });
         }
-        let dates = Box::new(self.dates_of()?);
+        let text = decoded(cell).into_owned();
+        let dates = Box::new(match Stamp::read(&text) {
+            Some(_) => self.dates_of(&table.names()[column])?,
+            // No date either; the first row says so.
+            None => Dates::new(None, None),
+        });
         let mut date = None;
-        let text = String::from_utf8_lossy(cell).into_owned();
         if !matches!(Stamp::read(&text), Some(Stamp::Instant(_) | Stamp::Local(_))) {
             let is_date = |at: &usize| {
                 let name = table.names()[*at].to_lowercase();
-                let cell = String::from_utf8_lossy(table.cell(*at));
+                let cell = decoded(table.cell(*at));
                 DATES.contains(&name.as_str()) && matches!(Stamp::read(&cell), Some(Stamp::Local(_)))
             };
             date = (0..table.names().len()).find(is_date);
@@ -228,7 +261,7 @@ impl Timing {
                 Ok(time)
             }
             Timing::Dates { column, date, dates, first } => {
-                let cell = |at: usize| String::from_utf8_lossy(table.cell(at));
+                let cell = |at: usize| decoded(table.cell(at));
                 let text = match date {
                     Some(date) => format!("{} {}", cell(*date), cell(*column)),
                     None => cell(*column).into_owned(),

@@ -3,18 +3,21 @@
 use super::{Reader, field};
 use crate::scalar::{Extrapolation, Interpolation, Table};
 use crate::text::document::NamedTable;
+use crate::text::remark::Remark;
 use crate::text::toml_value::Entry;
 
 impl Reader {
     pub(super) fn table(&mut self, entry: &Entry<'_>) -> Option<NamedTable> {
         let keys = ["x", "y", "values", "method", "outside", "x_unit", "y_unit"];
         let (quantity, fields) = self.in_table(entry, "a table", &keys)?;
-        let mut missing = |key: &str| {
+        for key in ["x", "values", "outside"] {
             if field(&fields, key).is_none() {
-                self.values.error(entry.at.clone(), format!("table `{}` has no `{key}`", entry.key));
+                let title = format!("table `{}` has no `{key}`", entry.key);
+                let values = "say what it is outside its points: outside = \"hold\" (its last value) or \"linear\" (its last slope goes on)";
+                let help = (key == "outside").then(|| values.to_owned());
+                self.values.errors.push(Remark::error(&self.values.source, entry.at.clone(), title).help(help));
             }
-        };
-        ["x", "values", "outside"].into_iter().for_each(&mut missing);
+        }
         let x = self.values.numbers(field(&fields, "x")?)?;
         let y = match field(&fields, "y") {
             Some(found) => self.values.numbers(found)?,

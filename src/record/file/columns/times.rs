@@ -35,10 +35,12 @@ impl DataFile {
             }
             Cells::Seconds(lengths) => {
                 let said = self.said("t");
-                if said.factor.is_some_and(|factor| factor != 1.0) {
+                let what = said.factor.filter(|factor| *factor != 1.0).map(|_| "factor");
+                if let Some(what) = what.or(said.unit.as_ref().map(|_| "unit")) {
                     let held = format!("`{column}` holds lengths of time, whose unit is known");
-                    return Err(Error::Option(format!("the factor of `t`: column {held}; give none")));
+                    return Err(Error::Option(format!("the {what} of `t`: column {held}; give none")));
                 }
+                self.no_dates(&column)?;
                 let sign = if said.reversed { -1.0 } else { 1.0 };
                 let stamps = (0..samples).map(|sample| sign * lengths[row(sample)] + said.offset).collect();
                 Ok(((Time::from_stamps(stamps), seconds()), TimeSource::Numbers { column, unit: 1.0, origin: 0.0 }))
@@ -68,7 +70,7 @@ impl DataFile {
         stamp: impl Fn(usize) -> Option<Stamp>,
         text: impl Fn(usize) -> Option<String>,
     ) -> Result<((Time, TimeUnit), TimeSource), Error> {
-        let mut dates = self.dates_of()?;
+        let mut dates = self.dates_of(&column)?;
         for sample in 0..samples {
             let Some(stamp) = stamp(sample) else {
                 let text = text(sample).map_or("nothing".to_owned(), |text| format!("`{text}`"));
