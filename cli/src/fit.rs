@@ -70,6 +70,9 @@ pub fn run(one: &Fit, terminal: &Terminal) -> Result<Verdict, Failure> {
 /// A derived quantity with the digits that its standard error leaves.
 fn shown(one: &Derived) -> String {
     let (Some(error), Some((lower, upper))) = (one.standard_error, one.interval) else {
+        if !one.value.is_finite() {
+            return format!("{}: its expression is no finite number at the estimate", one.name);
+        }
         let value = Cell::number(one.value, 6);
         return format!("{} = {}, not known: it depends on a parameter that is not", one.name, value.text());
     };

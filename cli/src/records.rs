@@ -72,7 +72,7 @@ fn prepared(record: Record, model: &Model, options: &RecordOptions, of_initial: 
         record = record.between(from.unwrap_or(f64::NEG_INFINITY)..to.unwrap_or(f64::INFINITY))?;
     }
     Ok(match options.every {
-        Some(n) => record.decimate(n)?,
+        Some(n) => model.thinned(&record, n)?,
         None => record,
     })
 }

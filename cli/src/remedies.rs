@@ -57,6 +57,7 @@ const NAMES: &[(&str, &str)] = &[
     ("Model::initial_noise", "`initial_noise`"),
     ("Model::noise", "`noise`"),
     ("Parameter::per_experiment", "--per-record"),
+    ("Record::decimate", "--every {}"),
     ("diagnose::profile", "`greybox profile`"),
     ("initial_from_first_sample", "--initial first"),
 ];

@@ -200,7 +200,8 @@ def simulate(
     time, sample_time, columns, hold
         Of the frame, as in :class:`Record`.
     integrator : str, optional
-        As in :func:`fit`; one step of Runge-Kutta 4 per sample without it.
+        As in :func:`fit`; else what a model file says, else steps of Runge-Kutta 4 that become finer until the outputs change by less than a part of
+        1e-6, or implicit ones.
 
     Returns
     -------
@@ -223,7 +224,7 @@ def simulate(
     start = [float(initial[name]) if initial and name in initial else None for name in states]
     data = framed(data)
     record = Record(data, None, time, sample_time, columns, hold).core(equations, "simulation", outputs=False)
-    found = equations.core.simulate(values, start, record, integrator)
+    found = equations.core.simulate(values, start, record, integrator or equations.defaults().get("integrator"))
     if noise:
         found = found.with_noise([float(noise.get(name, 0.0)) for name in outputs], seed)
     columns_ = dict(zip([*inputs, *outputs], [*found.inputs(), *found.outputs()], strict=True))

@@ -128,6 +128,10 @@ class Record:
 def _in_python(text: str) -> str:
     """Give an error of the library's reader with the remedies that there are in Python."""
     for theirs, ours in (
+        (
+            r'give DataFile::factor\("([^"]+)", ([^)]*)\) if it counts revolutions, or DataFile::factor\("[^"]+", ([^)]*)\) if',
+            r"give a frame in which `\1` is multiplied by \2 if it counts revolutions, or by \3 if",
+        ),
         (r'DataFile::factor\("([^"]+)", ([^)]*)\), or 1 if', r"a frame in which `\1` is multiplied by \2, or by 1 if"),
         (r'DataFile::unit\("([^"]+)", ("[^"]+")\), which', r"a frame in which `\1` is converted from \2, which"),
         (r', which converts it, or DataFile::factor\("[^"]+", 1\) if', r", or a frame as it stands if"),

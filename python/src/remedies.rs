@@ -45,6 +45,7 @@ const NAMES: &[(&str, &str)] = &[
     ("Fit::weighting", "weighting"),
     ("Model::", "Model."),
     ("Parameter::per_experiment", "per_experiment=True"),
+    ("Record::decimate", "a frame of fewer rows"),
     ("diagnose::profile", "Fit.profile"),
     ("initial_from_first_sample", "initial=\"first\""),
 ];

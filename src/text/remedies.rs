@@ -20,7 +20,8 @@ pub fn renamed(text: &str, names: &[(&str, &str)]) -> String {
         let mut found = pieces.next().unwrap_or_default().to_owned();
         for piece in pieces {
             // Another function, whose name begins with this one.
-            if function.ends_with(char::is_alphanumeric) && piece.starts_with(|c: char| c.is_alphanumeric() || c == '_') {
+            if function.ends_with(char::is_alphanumeric) && piece.starts_with(|c: char| c.is_alphanumeric() || c == '_')
+            {
                 found.extend([function, piece]);
                 continue;
             }

@@ -54,8 +54,8 @@ pub(super) fn advice(
         let name = &excited.name;
         if is_level(unknown) {
             advice.push(format!(
-                "`{name}` stands in the noise of the model alone (Model::noise, Model::diffusion), which this prediction does not use: take Kalman, \
-                 or fix it"
+                "`{name}` stands in the noise of the model alone (Model::noise, Model::diffusion), which this prediction does not use: take \
+                 the predictor Kalman, which does, or fix it"
             ));
         } else if excited.segments.iter().all(|segment| segment.share == 0.0) {
             advice.push(format!("`{name}` moves no output by a slope: fix it, unless it stands in conditions"));

@@ -66,8 +66,8 @@ pub(crate) fn without_slope(evidence: &Evidence<'_>, i: usize) -> Option<&'stati
     let Role::Parameter(p) = objective.problem.unknowns.row[i].role else { return None };
     if evidence.point.norms[i] == 0.0 && objective.sweep.levels().contains(&p) && !objective.sweep.predicts_variance() {
         return Some(
-            "stands in the noise of the model alone (Model::noise, Model::diffusion), which this prediction does not use: take Kalman, which \
-             does, or fix it",
+            "stands in the noise of the model alone (Model::noise, Model::diffusion), which this prediction does not use: take the predictor \
+             Kalman, which does, or fix it",
         );
     }
     let choosing = objective.sweep.choosing();
