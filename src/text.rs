@@ -253,14 +253,14 @@ impl Model {
     pub fn fit(&self, records: &[Record]) -> Result<Fit<'_, Equations>, crate::error::Error> {
         let records = records.iter().map(|record| self.prepare(record.clone())).collect::<Result<Vec<Record>, _>>()?;
         let mut fit = Fit::new(&*self.equations, &records).parameters(self.parameters.clone());
-        fit = fit.noise_of_some(self.noise());
         if let Some(integrator) = self.integrator() {
             fit = fit.integrator_by_name(integrator)?;
         }
-        match self.predictor() {
-            Some(predictor) => fit.predictor_by_name(predictor),
-            None => Ok(fit),
+        if let Some(predictor) = self.predictor() {
+            fit = fit.predictor_by_name(predictor)?;
         }
+        // A filter reads it from the equations.
+        Ok(if fit.filters() { fit } else { fit.noise_of_some(self.noise()) })
     }
 }
 

@@ -165,10 +165,10 @@ pub fn fit<'a>(
     if let Some(name) = options.predictor.as_deref().or(model.predictor()) {
         fit = fit.predictor_by_name(name)?;
     }
-    refuse_noise(options, options.predictor.as_deref().or(model.predictor()))?;
-    fit = match options.noise_covariance {
-        true => fit.noise_covariance(),
-        false => fit.noise_by_name(pairs(&noise(model, &options.noise)?))?,
+    fit = match options.predictor.as_deref().or(model.predictor()).filter(|name| is_filter(name)) {
+        Some(filter) => without_noise(options, filter).map(|()| fit)?,
+        None if options.noise_covariance => fit.noise_covariance(),
+        None => fit.noise_by_name(pairs(&noise(model, &options.noise)?))?,
     };
     let input_noise = numbers("--input-noise", &options.input_noise)?;
     if !input_noise.is_empty() {
@@ -205,19 +205,20 @@ pub fn fit<'a>(
     Ok(fit)
 }
 
-/// Refuses noise of outputs beside a filter, which takes that of the model.
-fn refuse_noise(options: &FitOptions, predictor: Option<&str>) -> Result<(), Failure> {
-    let is_filter =
-        |name: &&str| ["kalman", "second-order"].contains(&name.split(':').next().unwrap_or_default().trim());
+/// Whether a predictor is a filter, which takes the noise of the model.
+fn is_filter(predictor: &str) -> bool {
+    ["kalman", "second-order"].contains(&predictor.split(':').next().unwrap_or_default().trim())
+}
+
+/// Refuses noise of outputs that is said beside a filter.
+fn without_noise(options: &FitOptions, filter: &str) -> Result<(), Failure> {
     let option = match (options.noise.first(), options.noise_covariance) {
         (Some((name, value)), _) => format!("--noise {name}={value}"),
         (None, true) => "--noise-covariance".to_owned(),
         (None, false) => return Ok(()),
     };
-    predictor.filter(is_filter).map_or(Ok(()), |name| {
-        Err(format!("{option} has no effect on the predictor {name}, a filter: it takes `noise` of the model file")
-            .into())
-    })
+    Err(format!("{option} has no effect on the predictor {filter}, a filter: it takes `noise` of the model file")
+        .into())
 }
 
 /// The noise of the outputs as the model file has it, and as it was said, which goes before.

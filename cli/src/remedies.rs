@@ -34,6 +34,7 @@ const NAMES: &[(&str, &str)] = &[
     ),
     ("for decimal commas there is DataFile::decimal_comma", "decimal commas need a semicolon or tab between cells"),
     ("is skipped by DataFile::units_row", "belongs right below the names"),
+    ("DataFile::offset", "an offset"),
     ("DataFile::reversed turns a sign", "turn a sign in the model"),
     ("DataFile::factor(\"t\", ..)", "--time-unit"),
     ("DataFile::column", "--column {}"),

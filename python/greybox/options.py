@@ -83,8 +83,10 @@ def settings(equations: Equations, given: Options) -> dict[str, Any]:
         # Of outputs that are left out, that of a model file stays.
         noise = {**(defaults.get("noise") or {}), **noise}
     predictor = str(given.get("predictor") or "").partition(":")[0].strip()
-    if chosen and predictor in ("kalman", "second-order"):
-        raise Error(f"noise={chosen!r} has no effect on the predictor {predictor}, a filter: it takes `noise` of the model")
+    if predictor in ("kalman", "second-order"):
+        if chosen:
+            raise Error(f"noise={chosen!r} has no effect on the predictor {predictor}, a filter: it takes `noise` of the model")
+        noise = None
     if starts is not None:
         starts = whole("starts", starts, 1)
     if given.get("staged") and given.get("multiple_shooting"):

@@ -29,6 +29,7 @@ const NAMES: &[(&str, &str)] = &[
     ("DataFile::delimiter", "sep of pandas.read_csv"),
     ("DataFile::fill, Record::from_series", "gb.align"),
     ("DataFile::fill", "gb.align"),
+    ("DataFile::offset", "an offset"),
     ("DataFile::reversed turns a sign", "turn a sign in the model"),
     ("DataFile::sample_time", "sample_time"),
     ("DataFile::units_row", "skiprows of pandas.read_csv"),

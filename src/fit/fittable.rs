@@ -90,7 +90,7 @@ pub(super) fn stepping<M: Made>(
     chosen: Option<&M::Stepping>,
     predictor: Option<&Predicting>,
 ) -> Option<M::Stepping> {
-    let is_filter = predictor.is_some_and(|Predicting(predictor)| predictor.is_filter());
+    let is_filter = predictor.is_some_and(Predicting::is_filter);
     chosen.cloned().or_else(|| is_filter.then(|| model.exact()).flatten())
 }
 
@@ -126,6 +126,10 @@ pub struct Predicting(Arc<dyn Prediction>);
 impl Predicting {
     pub fn new(predictor: impl Predictor) -> Self {
         Predicting(Arc::new(predictor))
+    }
+
+    pub fn is_filter(&self) -> bool {
+        self.0.is_filter()
     }
 }
 
