@@ -329,7 +329,7 @@ pub enum Error {
     },
     /// A record that is thinned for a model of which each sample is a step.
     #[error(
-        "experiment `{experiment}`: every {every}-th sample (Record::decimate({every})) would be a record of another plant: {why}, which would come \
+        "experiment `{experiment}`: one of {every} samples (Record::decimate({every})) would be a record of another plant: {why}, which would come \
          less often, by means of the inputs; take all samples, or resample the record yourself and write the model for the longer interval"
     )]
     Thinned {

@@ -257,7 +257,7 @@ impl<'a, M: Made> Fit<'a, M> {
     /// are the pieces near them. Stages need a simulation to be predicted ([`FreeRun`](crate::FreeRun), the default), and no pre-filter; where the
     /// model cannot be read as a graph, has more than six states, or its integrator chooses its steps, they are multiple shooting alone. The estimate says
     /// what came of them ([`WarningCode::Staged`](crate::WarningCode::Staged)). The evaluations of stages that led somewhere are counted, their
-    /// trial steps are not.
+    /// trial steps are not. Where the search from their end leaves an output unexplained, searches from 32 starts follow, as without them.
     ///
     /// ```
     /// # use greybox::{Experiment, Fit, free, pmsm::{Surface, Winding}};
@@ -294,7 +294,7 @@ impl<'a, M: Made> Fit<'a, M> {
     ///
     /// A start is kept where there are no pieces: no record of 16 samples, pieces of eight samples that cannot be simulated,
     /// outputs that do not give the state where the model has no filter (it cannot be read as a graph, or has more than six states), a predictor that corrects
-    /// the state, a pre-filter. The note says so.
+    /// the state, a pre-filter. The note says so. Where the search from its end leaves an output unexplained, searches from 32 starts follow, as without it.
     ///
     /// ```
     /// # use greybox::{Experiment, Fit, free, pmsm::{Surface, Winding}};

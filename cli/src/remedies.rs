@@ -37,6 +37,7 @@ const NAMES: &[(&str, &str)] = &[
     ("DataFile::offset", "an offset"),
     ("DataFile::reversed turns a sign", "turn a sign in the model"),
     ("DataFile::factor(\"t\", ..)", "--time-unit"),
+    ("DataFile::factor of `t`", "--time-unit"),
     ("DataFile::column", "--column {}"),
     ("DataFile::dates", "--date-order"),
     ("DataFile::factor", "--unit {}"),

@@ -16,9 +16,13 @@ pub fn run(one: &Simulate, terminal: &Terminal) -> Result<Verdict, Failure> {
     let stored = one.estimate.as_deref().map(estimate).transpose()?;
     // A record of the fit begins as the fit found it, for which outputs need not be in the file.
     let name = path.file_stem().unwrap_or_default().to_string_lossy();
-    let is_fitted = stored.iter().flat_map(|found| &found.experiments).any(|record| record.name == name);
-    let as_found = is_fitted && one.of_model.initial.is_empty();
-    let inputs = records::inputs(&path, &model, &one.of_records, &one.of_model.initial, !as_found, terminal)?;
+    let fitted = stored.iter().flat_map(|found| &found.experiments).find(|record| record.name == name);
+    let fitted = fitted.filter(|_| one.of_model.initial.is_empty());
+    let read = |measured| records::inputs(&path, &model, &one.of_records, &one.of_model.initial, measured, terminal);
+    let inputs = read(fitted.is_none())?;
+    // Another part of the file begins elsewhere.
+    let as_found = fitted.is_some_and(|record| record.samples == inputs.len() as u64);
+    let inputs = if fitted.is_some() && !as_found { read(true)? } else { inputs };
     let options = ModelOptions { values: one.of_model.clone(), ..Default::default() };
     let mut parameters = declared(&model, &options)?;
     // What the command line sets is kept.

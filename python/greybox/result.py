@@ -234,7 +234,8 @@ class Fit(Estimate):
         Raises
         ------
         Error
-            If blocks are longer than half of a record, or fewer than twenty refits ended.
+            If blocks are longer than half of a record, or fewer than twenty refits ended; of a filter or a horizon, whose errors are also those of a
+            disturbed plant (take :meth:`profile`).
 
         Warns
         -----

@@ -55,7 +55,7 @@ const LEAST: usize = 20;
 const TOGETHER: usize = 64;
 
 /// Refits `count` records made of the simulation and resampled residuals, from the estimate on. Residuals of weighted samples are resampled
-/// times the roots of their weights, as errors of one size.
+/// times the roots of their weights, as errors of one size; weights that depend on outputs are those of each resampled record.
 ///
 /// # Errors
 /// A predictor that takes in measurements (a filter, [`Horizon`](crate::Horizon)): records made of its predictions are not those of a

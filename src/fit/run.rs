@@ -1,6 +1,6 @@
 //! Running a problem: search, estimate at a given point, objective, prediction, states.
 
-use super::elsewhere::with_work_of;
+use super::elsewhere::{leaves_unexplained, with_work_of};
 use super::predict::asked;
 use super::refine::{Attempt, Start};
 use super::search::{at_end, search, settled};
@@ -37,13 +37,19 @@ impl Problem<'_> {
         let control = self.control(begin);
         let (found, led) = self.run_first(begin, &control);
         // Before finer methods, each of which takes several times as long.
-        let further = found.as_ref().ok().and_then(|found| self.search_further(found, &control));
+        let explained = led.as_ref().is_some_and(Led::explains);
+        let further = found.as_ref().ok().filter(|_| !explained);
+        let further = further.and_then(|found| self.search_further(found, &control));
         let found = found.map(|found| with_work_of(found, further.as_ref()));
         let found = match further.as_ref().zip(found.as_ref().ok()).and_then(|(further, found)| further.usable(found)) {
             Some(usable) => usable,
             None => self.or_in_stages(self.refined(found, 0, begin, &control), &control)?,
         };
-        let found = self.searched_elsewhere(&found, further.as_ref(), &control).unwrap_or(found);
+        // Pieces that are explained have an estimate of their own.
+        let found = match explained && leaves_unexplained(&found) {
+            true => found,
+            false => self.searched_elsewhere(&found, further.as_ref(), &control).unwrap_or(found),
+        };
         Ok(self.or_by_pieces(found, led.as_ref(), &control))
     }
 

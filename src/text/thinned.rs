@@ -14,7 +14,7 @@ impl Model {
         let layout = self.equations.layout();
         let jumping = self.document.states.iter().find(|state| state.jump.is_some());
         let why = match jumping {
-            _ if n == 1 => None,
+            _ if n <= 1 => None,
             Some(state) => Some(format!("samples change state `{}` (jump)", state.quantity.name)),
             None => {
                 (layout.kind == Kind::Discrete).then(|| "the model is discrete, and its step is one sample".to_owned())

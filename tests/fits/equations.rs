@@ -235,7 +235,8 @@ fn equations_are_simulated_as_their_model() {
         }
     };
     let at = |p: &[f64]| Fleet::new(&equations).parameters(p.iter().copied().map(fixed).collect());
-    let found = at(&from).simulate(&[0.3, -0.1], &inputs(&push)).unwrap();
+    let one = at(&from).integrator(Rk4 { substeps: 1 });
+    let found = one.simulate(&[0.3, -0.1], &inputs(&push)).unwrap();
     let run = simulate(&Pendulum, &truth, &start, time.clone(), &torques).unwrap();
     assert_eq!((found.len(), found.time(1), &found.inputs()[0].values[..]), (300, 0.52, &push[..]));
     close(&found.with_noise(&[0.02, 0.05], 4), run.clone().with_noise(Swing { phi: 0.02, w: 0.05 }, 4));

@@ -26,8 +26,11 @@ pub(super) fn advice(
     time_unit: &TimeUnit,
 ) -> Vec<String> {
     let mut advice = vec![];
-    let is_level = |unknown: &Unknown| matches!(unknown.role, Role::Parameter(p) if levels.contains(&p));
-    let n = unknowns.iter().filter(|unknown| !is_level(unknown)).count() as u64;
+    let is_level = |excited: &Excitation, unknown: &Unknown| {
+        excited.strength == 0.0 && matches!(unknown.role, Role::Parameter(p) if levels.contains(&p))
+    };
+    let all = found.excitation.iter().zip(unknowns);
+    let n = unknowns.len() as u64 - all.filter(|(excited, unknown)| is_level(excited, unknown)).count() as u64;
     if found.generic_rank < n {
         advice.push(format!(
             "wherever the parameters lie, the sensitivities to the {n} unknowns have rank {}: with these inputs and outputs no \
@@ -52,7 +55,7 @@ pub(super) fn advice(
     }
     for (excited, unknown) in found.excitation.iter().zip(unknowns) {
         let name = &excited.name;
-        if is_level(unknown) {
+        if is_level(excited, unknown) {
             advice.push(format!(
                 "`{name}` stands in the noise of the model alone (Model::noise, Model::diffusion), which this prediction does not use: take \
                  the predictor Kalman, which does, or fix it"

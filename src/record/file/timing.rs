@@ -106,7 +106,6 @@ impl DataFile {
         first: f64,
     ) -> Result<Option<Ticks>, Error> {
         let (name, said) = (&names[column], self.said("t"));
-        self.no_dates(name)?;
         if name.is_empty() && said.name.is_none() {
             return self.place(names, "t").map(|_| None);
         }
@@ -124,6 +123,7 @@ impl DataFile {
                 "column `{name}` has dates that are written as numbers ({first}): write them as 2025-03-20 14:05:00, or, if they are a count, {remedy}"
             )));
         }
+        self.no_dates(name)?;
         let unit = said.factor.or_else(|| named.as_ref().map(TimeUnit::seconds));
         let long_ago = SINCE_1970.iter().find(|(least, _)| unit.is_none() && first.abs() >= *least);
         let (unit, origin) = long_ago.map_or((unit.unwrap_or(1.0), 0.0), |(_, unit)| (*unit, first));
@@ -147,7 +147,7 @@ impl DataFile {
     fn no_numbers(&self, column: &str) -> Result<(), Error> {
         let said = self.said("t");
         let option = match &said {
-            Column { factor: Some(_), .. } => "DataFile::factor",
+            Column { factor: Some(factor), .. } if *factor != 1.0 => "DataFile::factor",
             Column { unit: Some(_), .. } => "DataFile::unit",
             Column { reversed: true, .. } => "DataFile::reversed",
             Column { offset, .. } if *offset != 0.0 => "DataFile::offset",
