@@ -32,8 +32,8 @@ pub(crate) struct Transition<S> {
     covariance: Vec<S>,
 }
 
-/// A plant that does not come to rest.
-pub(crate) struct Restless {
+/// A plant whose covariance does not come to an end.
+pub(crate) struct NotStationary {
     /// The state in which this shows the most.
     pub state: usize,
     /// The logarithm by which it grows, per unit of the interval.
@@ -90,17 +90,17 @@ impl<S: Scalar> Transition<S> {
     }
 
     /// The covariance that the noise of a continuous plant leaves in the end.
-    pub fn at_rest(n: usize, a: &[S], q: &[S]) -> Result<Vec<S>, Restless> {
+    pub fn at_rest(n: usize, a: &[S], q: &[S]) -> Result<Vec<S>, NotStationary> {
         let values: Vec<f64> = a.iter().map(Scalar::value).collect();
         let growth = growth(n, &values);
         // Without any, nothing decays.
         let short = if growth > 0.0 { SHORT / growth } else { 1.0 };
-        let rate = |Restless { state, rate }| Restless { state, rate: rate / short };
-        Transition::over(n, a, q, S::from(short)).forever().map_err(rate)
+        let rate = |NotStationary { state, rate }| NotStationary { state, rate: rate / short };
+        Transition::over(n, a, q, S::from(short)).stationary().map_err(rate)
     }
 
-    /// The covariance after as many such intervals as the plant takes to come to rest.
-    pub fn forever(mut self) -> Result<Vec<S>, Restless> {
+    /// The covariance after so many such intervals that it changes no more.
+    pub fn stationary(mut self) -> Result<Vec<S>, NotStationary> {
         let n = self.n;
         let mut doublings = 0;
         let kept = loop {
@@ -122,7 +122,7 @@ impl<S: Scalar> Transition<S> {
         // The diagonal of a power is the part that each state takes in the modes that are left, whatever its unit.
         let state = (0..n).fold(0, |most, i| if kept[i] > kept[most] { i } else { most });
         let rate = kept[state].max(f64::MIN_POSITIVE).ln() / (doublings as f64).exp2();
-        Err(Restless { state, rate })
+        Err(NotStationary { state, rate })
     }
 
     /// What is left of the state, `e^{Ah}`.
@@ -310,7 +310,7 @@ mod tests {
         let (mut a, mut q) = (vec![0.0; N * N], vec![0.0; N * N]);
         q[0] = 1.0;
         (1..N).for_each(|i| a[i * N + i - 1] = 1.0);
-        let found = Transition::discrete(N, a, q).forever().ok().unwrap();
+        let found = Transition::discrete(N, a, q).stationary().ok().unwrap();
         assert!((0..N * N).all(|at| found[at] == f64::from(u8::from(at % (N + 1) == 0))), "{found:?}");
     }
 
@@ -318,7 +318,7 @@ mod tests {
     #[test]
     fn slow_modes_after_a_jump() {
         let (h, m) = (1e-4, 1e-5);
-        let found = Transition::over(1, &[-m], &[1.0], h).after(&[1.0]).forever().ok().unwrap();
+        let found = Transition::over(1, &[-m], &[1.0], h).after(&[1.0]).stationary().ok().unwrap();
         // Some thirty doublings, whose roundings add up.
         assert!((found[0] * 2.0 * m - 1.0).abs() < 1e-13, "{}", found[0]);
     }
@@ -328,7 +328,7 @@ mod tests {
     #[test]
     fn without_rest() {
         let of = |a: [f64; 4]| {
-            let Err(Restless { state, rate }) = Transition::at_rest(2, &a, &[1.0; 4]) else { panic!("{a:?}") };
+            let Err(NotStationary { state, rate }) = Transition::at_rest(2, &a, &[1.0; 4]) else { panic!("{a:?}") };
             (state, rate)
         };
         assert_eq!(of([0.0; 4]).0, 0);
@@ -340,7 +340,9 @@ mod tests {
         assert!(of([0.0, 1.0, -4.0, 0.0]).1.abs() < 1e-10);
         let (state, rate) = of([-1.0, 2.0, 0.0, 0.3]);
         assert!(state == 1 && (rate / 0.3 - 1.0).abs() < 1e-12, "{state} {rate}");
-        let Err(Restless { rate, .. }) = Transition::discrete(1, vec![1.1], vec![1.0]).forever() else { panic!() };
+        let Err(NotStationary { rate, .. }) = Transition::discrete(1, vec![1.1], vec![1.0]).stationary() else {
+            panic!()
+        };
         assert!((rate / 1.1f64.ln() - 1.0).abs() < 1e-12, "{rate}");
     }
 }

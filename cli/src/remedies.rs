@@ -36,6 +36,7 @@ const NAMES: &[(&str, &str)] = &[
     ("is skipped by DataFile::units_row", "belongs right below the names"),
     ("DataFile::offset", "an offset"),
     ("DataFile::reversed turns a sign", "turn a sign in the model"),
+    ("DataFile::reversed", "a turned sign"),
     ("DataFile::factor(\"t\", ..)", "--time-unit"),
     ("DataFile::factor of `t`", "--time-unit"),
     ("DataFile::column", "--column {}"),

@@ -31,6 +31,7 @@ const NAMES: &[(&str, &str)] = &[
     ("DataFile::fill", "gb.align"),
     ("DataFile::offset", "an offset"),
     ("DataFile::reversed turns a sign", "turn a sign in the model"),
+    ("DataFile::reversed", "a turned sign"),
     ("DataFile::sample_time", "sample_time"),
     ("DataFile::units_row", "skiprows of pandas.read_csv"),
     ("DataFile::zone", "tz_localize of pandas"),

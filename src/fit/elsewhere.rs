@@ -204,13 +204,13 @@ impl Problem<'_> {
     /// for, where the measurements tell nothing by any parameters, and where the variance is predicted: that likelihood has no bound at noise levels
     /// of zero, which some start would find.
     pub(super) fn search_further(&self, found: &Summary, control: &Control) -> Option<Further> {
-        let hopeless = [WarningCode::ConstantOutput, WarningCode::TooFewMeasurements];
+        let untold = [WarningCode::ConstantOutput, WarningCode::TooFewMeasurements];
         let predicted = self.settings.noise == Noise::Predicted;
         if control.stops()
             || !leaves_unexplained(found)
             || self.settings.searches != SearchPlan::Single
             || predicted
-            || hopeless.into_iter().any(|code| is_useless(found, code))
+            || untold.into_iter().any(|code| is_useless(found, code))
         {
             return None;
         }

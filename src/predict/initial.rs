@@ -4,7 +4,7 @@ use super::{Plant, Unstable};
 use crate::layout::Kind;
 use crate::moments::entry;
 use crate::scalar::Scalar;
-use crate::transition::{Restless, Transition, squares};
+use crate::transition::{NotStationary, Transition, squares};
 use serde::{Deserialize, Serialize};
 
 /// The covariance of the state at the first sample, about the initial state that the fit estimates or is given, for
@@ -65,17 +65,18 @@ impl InitialCovariance {
             return Ok(vec![S::from(f64::NAN); n * (n + 1) / 2]);
         }
         let found = match (self, kind) {
-            (InitialCovariance::Stationary, Kind::Discrete) => Transition::discrete(n, a, q).forever(),
+            (InitialCovariance::Stationary, Kind::Discrete) => Transition::discrete(n, a, q).stationary(),
             // What samples change of the state is a part of its step; that of the first interval is taken for all.
             (InitialCovariance::Stationary, _) if plant.jumps() && plant.length().value() > 0.0 => {
                 let mut jump = vec![S::from(0.0); n * n];
                 plant.jump_slopes(x, &mut jump);
-                let per_second = |Restless { state, rate }| Restless { state, rate: rate / plant.length().value() };
-                Transition::over(n, &a, &q, plant.length()).after(&jump).forever().map_err(per_second)
+                let per_second =
+                    |NotStationary { state, rate }| NotStationary { state, rate: rate / plant.length().value() };
+                Transition::over(n, &a, &q, plant.length()).after(&jump).stationary().map_err(per_second)
             }
             (InitialCovariance::Stationary, _) => Transition::at_rest(n, &a, &q),
             _ => Ok(Transition::over(n, &a, &q, plant.length()).covariance()),
         };
-        found.map(upper).map_err(|Restless { state, rate }| Unstable { state, rate })
+        found.map(upper).map_err(|NotStationary { state, rate }| Unstable { state, rate })
     }
 }

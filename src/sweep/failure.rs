@@ -46,7 +46,7 @@ impl FailureSearch<'_> {
             let i = values.iter().position(|v| !v.is_finite())?;
             Some((i, values[i], if values[i].is_nan() { UNDEFINED } else { OVERFLOW }))
         };
-        let runaway = |x: &[f64]| x.iter().copied().enumerate().find(|(_, x)| x.abs() >= RUNAWAY);
+        let overflowing = |x: &[f64]| x.iter().copied().enumerate().find(|(_, x)| x.abs() >= OVERFLOWS);
         let name = |i: usize| &self.layout.states[i].name;
         let delays = delays(self.values, &self.late, p);
         let wrong = |delay: &Option<f64>| delay.is_some_and(|delay| !is_dead_time(delay));
@@ -78,7 +78,7 @@ impl FailureSearch<'_> {
                 // An output that was not measured need not be finite, except at the sample where the failure was
                 // noticed.
                 if !y.is_finite() && (!found.is_nan() || k == sample) {
-                    let hint = if runaway(&x).is_none() { UNDEFINED } else { OVERFLOW };
+                    let hint = if overflowing(&x).is_none() { UNDEFINED } else { OVERFLOW };
                     return broken(k, format!("output `{}`", self.layout.outputs[j].name), y, hint);
                 }
                 if ((found - y) / sigma[j]).abs() > (largest.2 / sigma[largest.1]).abs() {
@@ -95,7 +95,7 @@ impl FailureSearch<'_> {
                 return broken(k, format!("state `{}` after the sample", name(i)), value, hint);
             }
             if plant.flow(&mut next) == Err(Stuck) {
-                if let Some((i, value)) = runaway(&x) {
+                if let Some((i, value)) = overflowing(&x) {
                     return broken(k, format!("state `{}`", name(i)), value, OVERFLOW);
                 }
                 plant.jump(&mut x);
@@ -106,7 +106,7 @@ impl FailureSearch<'_> {
                 };
             }
             if let Some((i, value, hint)) = unsound(&next) {
-                let hint = if watched.ran_away() { OVERFLOW } else { hint };
+                let hint = if watched.overflowed() { OVERFLOW } else { hint };
                 return broken(k + 1, format!("state `{}`", name(i)), value, hint);
             }
             x = next;
@@ -118,7 +118,7 @@ impl FailureSearch<'_> {
 
 /// From this magnitude of a state on, at a sample or within a step, a failure counts as overflow: an integrator may be stuck or have
 /// computed infinity minus infinity.
-const RUNAWAY: f64 = 1e30;
+const OVERFLOWS: f64 = 1e30;
 
 const STUCK: &str = "; no step is short enough, or 100,000 of them do not reach the next sample: the model is too stiff for \
                      the method, jumps, or leaves its domain (take Esdirk, or smooth the model)";
@@ -135,28 +135,28 @@ const HUGE: &str = ", whose square overflows: check the units of the record, the
 /// Equations that note whether they are asked at a state that has run away.
 struct Watched<'w> {
     values: &'w dyn Functions<f64>,
-    ran_away: AtomicBool,
+    overflowed: AtomicBool,
 }
 
 impl<'w> Watched<'w> {
     fn new(values: &'w dyn Functions<f64>) -> Self {
-        Watched { values, ran_away: AtomicBool::new(false) }
+        Watched { values, overflowed: AtomicBool::new(false) }
     }
 
     /// Begins the next step.
     fn forget(&self) {
-        self.ran_away.store(false, Ordering::Relaxed);
+        self.overflowed.store(false, Ordering::Relaxed);
     }
 
-    fn ran_away(&self) -> bool {
-        self.ran_away.load(Ordering::Relaxed)
+    fn overflowed(&self) -> bool {
+        self.overflowed.load(Ordering::Relaxed)
     }
 }
 
 impl Functions<f64> for Watched<'_> {
     fn state(&self, t: f64, x: &[f64], u: &[f64], p: &[f64], to: &mut [f64]) {
-        if x.iter().any(|x| x.abs() >= RUNAWAY) {
-            self.ran_away.store(true, Ordering::Relaxed);
+        if x.iter().any(|x| x.abs() >= OVERFLOWS) {
+            self.overflowed.store(true, Ordering::Relaxed);
         }
         self.values.state(t, x, u, p, to);
     }

@@ -9,6 +9,9 @@ const LETTERS: [char; 32] = [
     '“', '”', '•', '–', '—', '˜', '™', 'š', '›', 'œ', '\u{9d}', 'ž', 'Ÿ',
 ];
 
+/// Bytes that are read at once.
+const CHUNK: usize = 8192;
+
 /// A text, in Windows-1252 (of which Latin-1 is a part) where it is no UTF-8.
 pub(super) fn decoded(bytes: &[u8]) -> Cow<'_, str> {
     let letter = |byte: &u8| match byte {
@@ -29,11 +32,15 @@ pub(super) struct Spaces<R> {
     space: bool,
     /// Within a cell in quotes.
     quoted: bool,
+    /// Bytes to be passed on, of which so many were.
+    kept: Vec<u8>,
+    given: usize,
 }
 
 impl<R> Spaces<R> {
     pub(super) fn new(separator: u8, bytes: R) -> Self {
-        Spaces { bytes, separate: separator == b' ', begin: true, space: false, quoted: false }
+        let (begin, space, quoted) = (true, false, false);
+        Spaces { bytes, separate: separator == b' ', begin, space, quoted, kept: vec![], given: 0 }
     }
 
     /// Whether a byte is left out, and one space stands before it.
@@ -59,30 +66,37 @@ impl<R> Spaces<R> {
     }
 }
 
-impl<R: Read> Read for Spaces<R> {
-    fn read(&mut self, to: &mut [u8]) -> io::Result<usize> {
-        if !self.separate || to.len() < 2 {
-            return self.bytes.read(to);
-        }
-        let mut read = vec![0; to.len() / 2];
-        loop {
+impl<R: Read> Spaces<R> {
+    /// Reads some bytes into those that are to be passed on; none at the end of the text.
+    fn fill(&mut self) -> io::Result<()> {
+        let mut read = [0; CHUNK];
+        (self.given, self.kept) = (0, vec![]);
+        while self.kept.is_empty() {
             let count = self.bytes.read(&mut read)?;
-            let mut end = 0;
+            if count == 0 {
+                return Ok(());
+            }
             for &byte in &read[..count] {
                 let (out, space) = self.take(byte);
-                if space {
-                    to[end] = b' ';
-                    end += 1;
-                }
-                if !out {
-                    to[end] = byte;
-                    end += 1;
-                }
-            }
-            if end > 0 || count == 0 {
-                return Ok(end);
+                self.kept.extend(space.then_some(b' '));
+                self.kept.extend((!out).then_some(byte));
             }
         }
+        Ok(())
+    }
+}
+
+impl<R: Read> Read for Spaces<R> {
+    fn read(&mut self, to: &mut [u8]) -> io::Result<usize> {
+        if !self.separate {
+            return self.bytes.read(to);
+        }
+        if self.given == self.kept.len() {
+            self.fill()?;
+        }
+        let count = (&self.kept[self.given..]).read(to)?;
+        self.given += count;
+        Ok(count)
     }
 }
 
