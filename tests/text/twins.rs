@@ -8,7 +8,7 @@ use greybox::models::{Positioning, PositioningLoop};
 use greybox::pmsm::*;
 use greybox::record::{Channel, Record};
 use greybox::text::{Model, shipped};
-use greybox::{Fit, Kind, Parameter, Rk4, Summary, Time, fixed, signals};
+use greybox::{Automatic, Fit, Kind, Parameter, Summary, Time, fixed, signals};
 
 signals! {
     struct Cable { rs: "ohm", ls: "H", ke: "V s/rad", r_cable: "ohm" }
@@ -116,7 +116,7 @@ fn record(text: &Model, noise: f64) -> Record {
     let inputs = Record::new(layout.states.clone(), Time::Uniform { start: 0.0, step }, channels, vec![]).unwrap();
     let truth: Vec<Parameter> = truth.into_iter().map(fixed).collect();
     // By the method that fits begin with: this excitation is too much for some of the models.
-    let fit = Fit::new(&**text.equations(), &[] as &[Record]).parameters(truth).integrator(Rk4 { substeps: 1 });
+    let fit = Fit::new(&**text.equations(), &[] as &[Record]).parameters(truth).integrator(Automatic::default());
     let made = fit.simulate(&vec![0.0; layout.states.len()], &inputs).unwrap();
     let size = |j: usize| made.outputs()[j].values.iter().fold(0.0, |size: f64, y| size.max(y.abs()));
     let sigma: Vec<f64> = (0..layout.outputs.len()).map(|j| noise * (size(j) + 1e-6)).collect();
