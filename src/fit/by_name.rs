@@ -47,6 +47,7 @@ impl<M: Made> Fit<'_, M> {
     }
 
     /// Whether the predictor is a filter.
+    #[cfg(feature = "text")]
     pub(crate) fn filters(&self) -> bool {
         self.predictor.as_ref().is_some_and(Predicting::is_filter)
     }
