@@ -41,7 +41,7 @@ pub fn run(one: &Fit, terminal: &Terminal) -> Result<Verdict, Failure> {
             output::line(if terminal.colored() { report.to_colored_text() } else { report.to_string() })?
         }
         _ => {
-            output::line(&estimate)?;
+            output::estimate(&estimate)?;
             derived.iter().try_for_each(|one| output::line(shown(one)))?;
         }
     }

@@ -2,7 +2,7 @@
 
 use crate::Failure;
 use crate::remedies::in_shell;
-use greybox::Report;
+use greybox::{Report, Summary};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
@@ -75,6 +75,13 @@ pub fn print(content: &[u8]) -> Result<(), Failure> {
 /// Prints a text, remedies in the words of the command line, and ends its line.
 pub fn line(text: impl std::fmt::Display) -> Result<(), Failure> {
     print(format!("{}\n", in_shell(text.to_string().trim_end())).as_bytes())
+}
+
+/// Prints an estimate. Its warnings are in the words of the command line before lines are wrapped, which may part the words of a remedy.
+pub fn estimate(found: &Summary) -> Result<(), Failure> {
+    let mut said = found.clone();
+    said.warnings.iter_mut().for_each(|warning| warning.text = in_shell(&warning.text));
+    line(said)
 }
 
 /// The ending of a path, in small letters.

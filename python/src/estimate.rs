@@ -44,7 +44,10 @@ impl Estimate {
     }
 
     fn __str__(&self) -> String {
-        in_python(&self.0.to_string())
+        // Before lines are wrapped, which may part the words of a remedy.
+        let mut said = self.0.clone();
+        said.warnings.iter_mut().for_each(|warning| warning.text = in_python(&warning.text));
+        in_python(&said.to_string())
     }
 
     /// `usable`, `usable_with_care` or `not_usable`.
