@@ -54,8 +54,8 @@ const LEAST: usize = 20;
 /// Refits run side by side; at most so many are left out where a time limit or a flag ends them.
 const TOGETHER: usize = 64;
 
-/// Refits `count` records made of the simulation and resampled residuals, from the estimate on. Residuals of weighted samples are resampled
-/// times the roots of their weights, as errors of one size; weights that depend on outputs are those of each resampled record.
+/// Refits `count` records made of the simulation and resampled residuals, from the estimate on. Weighted residuals, which may be of several sizes, stay
+/// where they are and change their signs by chance, all of a block alike (the wild bootstrap: C. F. J. Wu, Annals of Statistics 14 (1986) 1261).
 ///
 /// # Errors
 /// A predictor that takes in measurements (a filter, [`Horizon`](crate::Horizon)): records made of its predictions are not those of a
@@ -96,13 +96,7 @@ pub fn bootstrap(
     let predictions = (0..objective.experiments()).map(|e| objective.predict(e, &best));
     let predictions = predictions.collect::<Result<Vec<_>, _>>()?;
     check_complete(problem, &control, "the bootstrap")?;
-    let roots = (0..objective.experiments()).map(|e| {
-        let root = |k: usize| objective.weight(e, k).sqrt();
-        (0..problem.records()[e].len()).map(root).collect()
-    });
-    let roots: Vec<Vec<f64>> = roots.collect();
-    let of = |(prediction, roots): (&Simulated, &Vec<f64>)| centered(prediction, roots);
-    let residuals: Vec<Vec<Vec<f64>>> = predictions.iter().zip(&roots).map(of).collect();
+    let residuals: Vec<Vec<Vec<f64>>> = predictions.iter().map(centered).collect();
     if let Some(e) = residuals.iter().position(Vec::is_empty) {
         let experiment = problem.records()[e].name().to_owned();
         return Err(Error::TooFewSamples {
@@ -116,8 +110,11 @@ pub fn bootstrap(
     let refit = |number: usize| -> Option<Vec<f64>> {
         let mut random = Random::stream(seed, number as u64);
         let records = problem.records().iter().enumerate().map(|(e, record)| {
-            let drawn = draw(&residuals[e], record.len(), resampling, &mut random);
-            resampled(record, &predictions[e], drawn, &roots[e])
+            let errors = match objective.is_weighted() {
+                true => signed(&predictions[e], resampling, &mut random),
+                false => draw(&residuals[e], record.len(), resampling, &mut random),
+            };
+            resampled(record, &predictions[e], errors)
         });
         let again = objective.problem.with_records(records.collect()).ok()?;
         let again = objective.of(&again, objective.sweep);
@@ -210,17 +207,15 @@ fn check_blocks(problem: &Problem<'_>, residuals: &[Vec<Vec<f64>>], resampling: 
     }
 }
 
-/// The residuals, times the roots of their weights, of the samples with a weight of which all outputs have one, sample by sample. Centered: a
-/// mean that the model left would be counted as noise.
-fn centered(prediction: &Simulated, roots: &[f64]) -> Vec<Vec<f64>> {
-    let weighted = |column: &Vec<f64>| -> Vec<f64> {
-        let of = |(e, root): (&f64, &f64)| if *root > 0.0 { e * root } else { f64::NAN };
-        column.iter().zip(roots).map(of).collect()
+/// The residuals of the samples of which all outputs have one, sample by sample. Centered: a mean that the model left would
+/// be counted as noise.
+fn centered(prediction: &Simulated) -> Vec<Vec<f64>> {
+    let means: Vec<f64> = prediction.residuals.iter().map(|column| mean(column)).collect();
+    let samples = prediction.residuals.first().map_or(0, Vec::len);
+    let row = |k: usize| -> Vec<f64> {
+        prediction.residuals.iter().zip(&means).map(|(column, mean)| column[k] - mean).collect()
     };
-    let columns: Vec<Vec<f64>> = prediction.residuals.iter().map(weighted).collect();
-    let means: Vec<f64> = columns.iter().map(|column| mean(column)).collect();
-    let row = |k: usize| -> Vec<f64> { columns.iter().zip(&means).map(|(column, mean)| column[k] - mean).collect() };
-    (0..columns.first().map_or(0, Vec::len)).map(row).filter(|row| row.iter().all(|e| e.is_finite())).collect()
+    (0..samples).map(row).filter(|row| row.iter().all(|e| e.is_finite())).collect()
 }
 
 fn mean(values: &[f64]) -> f64 {
@@ -229,26 +224,19 @@ fn mean(values: &[f64]) -> f64 {
     if count > 0.0 { sum / count } else { 0.0 }
 }
 
-/// The record that the prediction and these errors, times the roots of the weights, make; what was not measured, or has no weight, stays so.
-fn resampled(record: &Record, prediction: &Simulated, errors: Vec<Vec<f64>>, roots: &[f64]) -> Record {
+/// The record that the prediction and these errors make; what was not measured stays so.
+fn resampled(record: &Record, prediction: &Simulated, errors: Vec<Vec<f64>>) -> Record {
     let outputs = record.outputs.iter().enumerate().map(|(j, channel)| {
-        let drawn = |(k, old): (usize, &f64)| match roots[k] > 0.0 && !old.is_nan() {
-            true => prediction.outputs[j][k] + errors[k][j] / roots[k],
-            false => *old,
-        };
-        channel.with(channel.values.iter().enumerate().map(drawn).collect::<Vec<f64>>())
+        let rows = channel.values.iter().zip(&prediction.outputs[j]).zip(&errors);
+        let drawn = |((old, new), e): ((&f64, &f64), &Vec<f64>)| if old.is_nan() { f64::NAN } else { new + e[j] };
+        channel.with(rows.map(drawn).collect::<Vec<f64>>())
     });
     Record { outputs: outputs.collect(), ..record.clone() }
 }
 
 /// As many rows as asked for, all outputs of a sample together.
 fn draw<Y: Clone>(residuals: &[Y], count: usize, resampling: Resampling, random: &mut Random) -> Vec<Y> {
-    let length = match resampling {
-        Resampling::Residuals => 1,
-        Resampling::Blocks(0) => (residuals.len() as f64).cbrt().round() as usize,
-        Resampling::Blocks(length) => length,
-    }
-    .clamp(1, residuals.len().max(1));
+    let length = block(resampling, residuals.len());
     let mut drawn = Vec::with_capacity(count + length);
     while drawn.len() < count {
         let begin = random.below(residuals.len() - length + 1);
@@ -256,6 +244,30 @@ fn draw<Y: Clone>(residuals: &[Y], count: usize, resampling: Resampling, random:
     }
     drawn.truncate(count);
     drawn
+}
+
+/// How many of so many residuals in a row stay together.
+fn block(resampling: Resampling, residuals: usize) -> usize {
+    match resampling {
+        Resampling::Residuals => 1,
+        Resampling::Blocks(0) => (residuals as f64).cbrt().round() as usize,
+        Resampling::Blocks(length) => length,
+    }
+    .clamp(1, residuals.max(1))
+}
+
+/// The residuals of all samples, those of a block with one sign; zero where there is none.
+fn signed(prediction: &Simulated, resampling: Resampling, random: &mut Random) -> Vec<Vec<f64>> {
+    let samples = prediction.residuals.first().map_or(0, Vec::len);
+    let length = block(resampling, samples);
+    let mut sign = 1.0;
+    let mut row = |k: usize| -> Vec<f64> {
+        if k.is_multiple_of(length) {
+            sign = if random.below(2) == 0 { 1.0 } else { -1.0 };
+        }
+        prediction.residuals.iter().map(|column| if column[k].is_finite() { sign * column[k] } else { 0.0 }).collect()
+    };
+    (0..samples).map(&mut row).collect()
 }
 
 /// Standard errors, bias and intervals as a table.

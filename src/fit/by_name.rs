@@ -1,6 +1,6 @@
 //! Declarations and choices of a fit by names that are known at run time.
 
-use super::fittable::{Made, Predicting};
+use super::fittable::Made;
 use super::{Fit, Records};
 use crate::error::{Error, find};
 use crate::integrate::{Discrete, Esdirk, Rk4, Rk45};
@@ -49,7 +49,7 @@ impl<M: Made> Fit<'_, M> {
     /// Whether the predictor is a filter.
     #[cfg(feature = "text")]
     pub(crate) fn filters(&self) -> bool {
-        self.predictor.as_ref().is_some_and(Predicting::is_filter)
+        self.predictor.as_ref().is_some_and(super::fittable::Predicting::is_filter)
     }
 
     /// As [`noise`](Fit::noise), by the names of the outputs, in any order. Of outputs that are left out it is estimated.
