@@ -9,6 +9,7 @@ mod convergence;
 mod derived;
 mod drift;
 mod identifiability;
+mod leverages;
 mod process_noise;
 mod profile;
 pub mod residuals;

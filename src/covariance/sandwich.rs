@@ -62,7 +62,8 @@ impl Bread {
         Some(Bread { linear: (*linear).clone(), curvature: 1.0, variance: 1.0, noise, tally })
     }
 
-    fn weighted(objective: &Objective<'_>, coordinates: &[f64]) -> Option<Self> {
+    /// That of weights and losses.
+    pub fn weighted(objective: &Objective<'_>, coordinates: &[f64]) -> Option<Self> {
         let unknowns = &objective.problem.unknowns;
         let make = |experiment: usize| {
             let columns = unknowns.columns(experiment).count();

@@ -1,7 +1,9 @@
 //! Bootstrap: refits of what the model could as well have measured. It asks for no normal distribution, and in blocks for
 //! no white residuals.
 
+use super::leverages::leverages;
 use super::{Pinned, check_complete, minimize};
+use crate::covariance::leverage::LEAST;
 use crate::error::Error;
 use crate::estimate::Summary;
 use crate::numeral::resolved;
@@ -42,7 +44,7 @@ pub struct Bootstrap {
     pub bias: Vec<f64>,
     /// The 95 % interval of each: the percentiles of the refits, their deviations from the estimate stretched by
     /// `sqrt(n / (n - p))` for the degrees of freedom that residuals have lost (Davison and Hinkley, *Bootstrap Methods*,
-    /// 1997, section 6.2.3).
+    /// 1997, section 6.2.3); weighted residuals have lost none.
     #[serde(with = "crate::real")]
     pub intervals: Vec<(f64, f64)>,
     /// The seed that makes the same again.
@@ -50,12 +52,13 @@ pub struct Bootstrap {
 }
 
 /// The fewest refits that have percentiles.
-const LEAST: usize = 20;
+const FEWEST: usize = 20;
 /// Refits run side by side; at most so many are left out where a time limit or a flag ends them.
 const TOGETHER: usize = 64;
 
 /// Refits `count` records made of the simulation and resampled residuals, from the estimate on. Weighted residuals, which may be of several sizes, stay
-/// where they are and change their signs by chance, all of a block alike (the wild bootstrap: C. F. J. Wu, Annals of Statistics 14 (1986) 1261).
+/// where they are, divided by one less their leverage, and change their signs by chance, all of a block alike (the wild bootstrap: C. F. J. Wu,
+/// Annals of Statistics 14 (1986) 1261; E. Flachaire, Computational Statistics and Data Analysis 49 (2005) 361).
 ///
 /// # Errors
 /// A predictor that takes in measurements (a filter, [`Horizon`](crate::Horizon)): records made of its predictions are not those of a
@@ -107,12 +110,16 @@ pub fn bootstrap(
         });
     }
     check_blocks(problem, &residuals, resampling)?;
+    let weighted: Option<Vec<Vec<Vec<f64>>>> = objective.is_weighted().then(|| {
+        let leverages = leverages(&objective, &best).unwrap_or_default();
+        predictions.iter().enumerate().map(|(e, prediction)| freed(prediction, leverages.get(e))).collect()
+    });
     let refit = |number: usize| -> Option<Vec<f64>> {
         let mut random = Random::stream(seed, number as u64);
         let records = problem.records().iter().enumerate().map(|(e, record)| {
-            let errors = match objective.is_weighted() {
-                true => signed(&predictions[e], resampling, &mut random),
-                false => draw(&residuals[e], record.len(), resampling, &mut random),
+            let errors = match &weighted {
+                Some(residuals) => signed(&residuals[e], resampling, &mut random),
+                None => draw(&residuals[e], record.len(), resampling, &mut random),
             };
             resampled(record, &predictions[e], errors)
         });
@@ -141,19 +148,22 @@ pub fn bootstrap(
     }
     let begun = tried.len();
     let found: Vec<Vec<f64>> = tried.into_iter().flatten().collect();
-    if found.len() < LEAST {
+    if found.len() < FEWEST {
         check_complete(problem, &control, "the bootstrap")?;
         return Err(Error::Option(format!(
             "only {} of {count} refits ended; twenty are the least, some thousand are wanted for percentiles",
             found.len()
         )));
     }
-    Ok(spread(estimate, &found, begun, seed))
+    // What weighted residuals have lost, the leverages gave back.
+    let lost = if weighted.is_some() { 0.0 } else { estimate.measurements as f64 - estimate.degrees_of_freedom() };
+    Ok(spread(estimate, &found, (begun, lost), seed))
 }
 
-/// Scatter and percentiles of the refits that ended, of `tried` in all.
-fn spread(estimate: &Summary, found: &[Vec<f64>], tried: usize, seed: u64) -> Bootstrap {
-    let stretch = (estimate.measurements as f64 / estimate.degrees_of_freedom().max(1.0)).sqrt();
+/// Scatter and percentiles of the refits that ended, of `tried` in all, of residuals that have lost so many degrees of freedom.
+fn spread(estimate: &Summary, found: &[Vec<f64>], (tried, lost): (usize, f64), seed: u64) -> Bootstrap {
+    let measurements = estimate.measurements as f64;
+    let stretch = (measurements / (measurements - lost).max(1.0)).sqrt();
     let mut result = Bootstrap {
         unknowns: estimate.unknowns.iter().map(|unknown| unknown.name.clone()).collect(),
         converged: found.len() as u64,
@@ -256,18 +266,25 @@ fn block(resampling: Resampling, residuals: usize) -> usize {
     .clamp(1, residuals.max(1))
 }
 
-/// The residuals of all samples, those of a block with one sign; zero where there is none.
-fn signed(prediction: &Simulated, resampling: Resampling, random: &mut Random) -> Vec<Vec<f64>> {
-    let samples = prediction.residuals.first().map_or(0, Vec::len);
-    let length = block(resampling, samples);
-    let mut sign = 1.0;
-    let mut row = |k: usize| -> Vec<f64> {
-        if k.is_multiple_of(length) {
-            sign = if random.below(2) == 0 { 1.0 } else { -1.0 };
-        }
-        prediction.residuals.iter().map(|column| if column[k].is_finite() { sign * column[k] } else { 0.0 }).collect()
+/// The residuals of all samples, divided by one less their leverage, which is what the fit took over of them; zero where there is none.
+fn freed(prediction: &Simulated, leverages: Option<&Vec<f64>>) -> Vec<Vec<f64>> {
+    let (samples, outputs) = (prediction.residuals.first().map_or(0, Vec::len), prediction.residuals.len());
+    let at = |k: usize, j: usize| {
+        let (residual, leverage) = (prediction.residuals[j][k], leverages.map_or(0.0, |own| own[k * outputs + j]));
+        if residual.is_finite() { residual / (1.0 - leverage).max(LEAST) } else { 0.0 }
     };
-    (0..samples).map(&mut row).collect()
+    (0..samples).map(|k| (0..outputs).map(|j| at(k, j)).collect()).collect()
+}
+
+/// These residuals, those of a block with one sign.
+fn signed(residuals: &[Vec<f64>], resampling: Resampling, random: &mut Random) -> Vec<Vec<f64>> {
+    let length = block(resampling, residuals.len());
+    let mut sign = || if random.below(2) == 0 { 1.0 } else { -1.0 };
+    let signed = |block: &[Vec<f64>]| -> Vec<Vec<f64>> {
+        let sign = sign();
+        block.iter().map(|row| row.iter().map(|e| sign * e).collect()).collect()
+    };
+    residuals.chunks(length).flat_map(signed).collect()
 }
 
 /// Standard errors, bias and intervals as a table.

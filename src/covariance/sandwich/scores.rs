@@ -9,6 +9,7 @@
 //! prediction nothing of the estimate. One less the leverage counts as [`LEAST`] there at least: of a measurement that alone determines an
 //! unknown the variance is then `CANCELED / LEAST`, ten times that of the noise of all, instead of growing without bound.
 
+use crate::covariance::leverage::LEAST;
 use crate::covariance::shares::Shares;
 use crate::information::Gathering;
 use crate::problem::{Accumulate, Objective};
@@ -20,9 +21,6 @@ use nalgebra::DMatrix;
 /// determines then covers 95.7 % of normal errors where that measurement's deviation is 2.2 times that of the prediction, and more
 /// where it is larger or smaller; with 0.35 it covered 93.8 % of 2,000 lines through 41 measurements.
 const CANCELED: f64 = 0.4;
-
-/// The least of one less the leverage, `1/26` for a prediction with five times the noise, rounded.
-const LEAST: f64 = 0.04;
 
 /// The triangle of the scores.
 pub(crate) struct Scores<'s> {
