@@ -109,23 +109,23 @@ fn by_inputs_before(evidence: &Evidence<'_>) -> Option<Warning> {
     }
     let sigma = objective.whitening.sigma();
     // What the minimum makes orthogonal to the slopes: errors times their weights.
-    let weight = |e: usize, j: usize, k: usize, error: f64| {
+    let weighted = |e: usize, j: usize, k: usize, error: f64| {
         let by_loss = objective.loss().map_or(1.0, |loss| loss.weight(error / sigma[j]));
-        objective.weight(e, k) * by_loss
+        error * objective.weight(e, k) * by_loss
     };
     let scales: Vec<Scale> = (0..layout.inputs.len()).map(|i| scale(evidence, i)).collect();
     let mut sums = vec![Before::default(); outputs * layout.inputs.len()];
     for (e, errors) in evidence.residuals.first_errors.iter().enumerate() {
+        let samples = errors.first().map_or(0, Vec::len);
         let inputs = objective.problem.records[e].inputs().iter().zip(&scales);
-        for ((input, scale), sums) in inputs.zip(sums.chunks_mut(outputs)) {
-            let u = &input.values;
-            for k in BEFORE..errors[0].len() {
-                let before = std::array::from_fn(|lag| scale.one(u[k - 1 - lag]));
-                for (j, (sums, errors)) in sums.iter_mut().zip(errors).enumerate() {
-                    if let Some(error) = errors[k] {
-                        sums.take(before, error * weight(e, j, k, error));
-                    }
-                }
+        let inputs: Vec<Vec<f64>> =
+            inputs.map(|(input, scale)| input.values[..samples].iter().map(|u| scale.one(*u)).collect()).collect();
+        for (j, errors) in errors.iter().enumerate() {
+            let numbers = errors.iter().enumerate().skip(BEFORE);
+            let (own, present): (Vec<f64>, Vec<f64>) =
+                numbers.map(|(k, error)| error.map_or((0.0, 0.0), |error| (weighted(e, j, k, error), 1.0))).unzip();
+            for (input, sums) in inputs.iter().zip(sums.iter_mut().skip(j).step_by(outputs)) {
+                sums.take(input, &own, &present);
             }
         }
     }
@@ -163,9 +163,13 @@ struct Before {
 }
 
 impl Before {
-    fn take(&mut self, before: [f64; BEFORE], error: f64) {
-        self.powers.take(std::array::from_fn(|i| before[0].powi(i as i32)), error);
-        self.changes.iter_mut().zip(before.windows(2)).for_each(|(sums, pair)| sums.take(pair[0] - pair[1], error));
+    /// Takes the values of the input, and the errors and whether there is one from sample [`BEFORE`] on.
+    fn take(&mut self, input: &[f64], errors: &[f64], present: &[f64]) {
+        let before = |samples: usize| &input[(BEFORE - samples).min(input.len())..];
+        self.powers.take_powers(before(1), errors, present);
+        for (lag, change) in self.changes.iter_mut().enumerate() {
+            change.take_differences(before(lag + 1), before(lag + 2), errors, present);
+        }
     }
 
     /// The root of the part of the squared errors that follows most certainly, and the probability by chance.
