@@ -4,6 +4,7 @@ mod absorb;
 mod as_argmin;
 mod batches;
 mod borders;
+mod by_output;
 mod checkpoint;
 mod control;
 mod curvature;

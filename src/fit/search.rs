@@ -52,7 +52,13 @@ pub(super) fn checkpoint(
     plain.problem.settings.checkpoint.as_ref().map(file).transpose()
 }
 
+/// Most rounds of one trial step.
+const SINGLE_STEPS: u32 = 6;
+
 /// Searches with fixed noise, one after the other, with the noise estimated between them.
+///
+/// The first determines three digits. Where other noise levels cost no pass, rounds of one trial step follow, each with the noise at its start: a step
+/// that lowers the cost lowers the likelihood's, since a logarithm is below its tangent. The last rounds go on until the noise has settled.
 pub(super) struct Rounds<'r> {
     plain: &'r Objective<'r>,
     optimizer: Arc<dyn Optimizer>,
@@ -64,6 +70,10 @@ pub(super) struct Rounds<'r> {
     memory: Memory,
     known: bool,
     round: u32,
+    /// How many more rounds of one trial step may follow.
+    single: u32,
+    /// Whether the present round is one.
+    is_single: bool,
     iterations: u64,
     /// Trial steps that are left of the limit.
     left: u64,
@@ -107,6 +117,8 @@ impl<'r> Rounds<'r> {
             memory: plain.memory.clone(),
             known: !noise::is_estimated(plain),
             round: 0,
+            single: if plain.keeps_outputs() { SINGLE_STEPS } else { 0 },
+            is_single: false,
             iterations: 0,
             left: optimizer.most(),
             evaluations: 0,
@@ -165,7 +177,13 @@ impl<'r> Rounds<'r> {
 
     /// Whether the noise is to be estimated where a round has ended.
     pub fn asks_noise(&self, round: &Round) -> bool {
-        !self.known && round.outcome.converged()
+        !self.known && (round.outcome.converged() || self.is_step(round))
+    }
+
+    /// Whether a round was a single trial step, and more are left of the limit.
+    fn is_step(&self, round: &Round) -> bool {
+        let limited = matches!(round.outcome, Outcome::IterationLimit { .. });
+        self.is_single && limited && round.iterations < self.left
     }
 
     /// Records how a round with this objective [ended], and the noise there if it was asked for; returns the end of the search if
@@ -176,6 +194,11 @@ impl<'r> Rounds<'r> {
         round: Round,
         noise: Option<Result<Whitening, Infeasible>>,
     ) -> Option<SearchEnd> {
+        let is_step = self.is_step(&round);
+        // A step that was rejected is repeated by a search that remembers it.
+        if is_step && round.coordinates == self.coordinates {
+            self.single = 0;
+        }
         self.round += 1;
         self.iterations += round.iterations;
         self.left = self.left.saturating_sub(round.iterations);
@@ -193,7 +216,7 @@ impl<'r> Rounds<'r> {
         if let Some(found) = noise {
             let found = found.unwrap_or_else(|_| self.whitening.clone());
             let changes = found.sigma().into_iter().zip(self.whitening.sigma()).map(|(a, b)| (a / b).ln().abs());
-            settled = self.round > 1 && changes.fold(0.0, f64::max) < NOISE_TOLERANCE;
+            settled = self.round > 1 && !is_step && changes.fold(0.0, f64::max) < NOISE_TOLERANCE;
             if !settled {
                 (self.whitening, linear) = (found, None);
             }
@@ -212,7 +235,9 @@ impl<'r> Rounds<'r> {
             }
             (outcome, _) => outcome,
         };
-        self.next = self.optimizer.limited(self.left);
+        self.is_single = self.single > 0;
+        self.single = self.single.saturating_sub(1);
+        self.next = self.optimizer.limited(if self.is_single { self.left.min(1) } else { self.left });
         self.memory = objective.memory;
         let end = SearchEnd {
             coordinates: self.coordinates.clone(),

@@ -68,14 +68,23 @@ impl Triangles {
     /// fewer rows, or missing ones, are filled with zeros. Does not allocate; fastest where `rows` begins at a cache line
     /// (64 bytes). A slice that is too short is absorbed as far as it goes.
     pub fn absorb(&mut self, rows: &mut [f64], count: usize) {
+        self.absorb_every(rows, count, 1);
+    }
+
+    /// [`absorb`](Self::absorb) of the first of every `step` rows, of which there are `count` in all.
+    pub(crate) fn absorb_every(&mut self, rows: &mut [f64], count: usize, step: usize) {
         let stride = (self.columns + 1) * self.lanes;
         let count = count.min(rows.len().checked_div(stride).unwrap_or(0));
-        self.rows += count as u64;
+        self.rows += count.div_ceil(step) as u64;
+        if step > 1 && self.scratch.is_empty() {
+            self.scratch = Aligned::zeros(absorb::ROWS * (self.columns + 1) * REGISTER);
+        }
         let task = absorb::Absorb {
             columns: self.columns + 1,
             lanes: self.lanes,
             triangles: &mut self.entries,
             rows: &mut rows[..count * stride],
+            step,
             factors: &mut self.factors,
             scratch: &mut self.scratch,
         };

@@ -5,6 +5,7 @@ use crate::covariance::SearchEnd;
 use crate::error::{Error, Failure};
 use crate::estimate::{CovarianceMethod, Summary};
 use crate::layout::Layout;
+use crate::pmsm::{Currents, Surface, Winding};
 use crate::problem::{Memory, Problem};
 use crate::random::Random;
 use crate::record::Record;
@@ -143,4 +144,25 @@ fn colored_errors_take_three_passes_with_slopes_at_most() {
         with_slopes[slopes / SAMPLES] += 1;
     }
     assert!(with_slopes[2] > 0 && with_slopes[3] > 0 && with_slopes[..2] == [0, 0], "{with_slopes:?}");
+}
+
+/// Passes of a motor's fit, in values and with slopes, where the noise is estimated and where it is given.
+#[test]
+fn noise_that_is_estimated_takes_two_more_passes_at_most() {
+    let model = Surface::new(4).unwrap();
+    let record = Experiment::from_file(&model, "examples/data/pmsm.csv").unwrap();
+    let fit = || Fit::new(&model, &record).parameters(Winding { rs: free(1.2), ls: free(1.75e-3), ke: free(0.63) });
+    let passes = |fit: Fit<'_, Surface>| {
+        let (problem, counts) = (fit.problem().unwrap(), Counts::default());
+        let counting = Counting { sweep: problem.sweep.clone(), counts: counts.clone() };
+        let found = Problem { sweep: Arc::new(counting), ..problem.clone() }.run().unwrap();
+        assert!(found.outcome.converged());
+        let samples = record.len() as f64;
+        (found, [0, 1].map(|kind: usize| counts[kind].load(Ordering::Relaxed) as f64 / samples))
+    };
+    let (found, estimated) = passes(fit());
+    let [id, iq] = [0, 1].map(|j: usize| found.outputs[j].fit.sigma);
+    let (_, given) = passes(fit().noise(Currents { id, iq }));
+    // Where a search begins, values are simulated for a part of the record.
+    assert!(estimated[1] <= given[1] + 2.0 && estimated[0] <= given[0] + 0.5, "{estimated:?} {given:?}");
 }

@@ -10,31 +10,38 @@ use crate::wide::{self, Task, Wide, Width};
 /// Rows that are absorbed together.
 const ROWS: usize = 256;
 
-/// Absorbs the rows of jobs that run in parallel lanes.
+/// Absorbs the rows of jobs that run in parallel lanes: into one triangle for each lane, or into one for each lane and output.
 pub(super) struct Absorber<'o> {
     weighing: Vec<Weighing<'o>>,
     /// Whether there is neither a loss nor a weight: the cost is half the sum of squares, plus that of the logarithms of variances where these are
     /// predicted.
     plain: bool,
+    /// How many triangles a lane has: one, or one for each output.
+    sets: usize,
+    /// Measurements, lane by lane and set by set.
     rows: Vec<u64>,
     /// Twice that cost, for each lane.
     sums: Vec<f64>,
     columns: usize,
-    triangles: Option<Triangles>,
-    alone: Option<Alone>,
+    /// Those of each set, where jobs run in parallel lanes.
+    triangles: Vec<Triangles>,
+    /// That of each set, where one job runs alone.
+    alone: Vec<Alone>,
 }
 
 impl<'o> Absorber<'o> {
-    pub fn new(jobs: &[&Job<'o>]) -> Self {
+    /// With one triangle for each lane, or one for each of so many outputs.
+    pub fn new(jobs: &[&Job<'o>], sets: usize) -> Self {
         let objective = jobs[0].objective;
         Absorber {
             weighing: jobs.iter().map(|job| Weighing::new(job.objective, job.experiment)).collect(),
             plain: objective.loss().is_none() && !objective.is_weighted(),
-            rows: vec![0; jobs.len()],
+            sets,
+            rows: vec![0; jobs.len() * sets],
             sums: vec![],
             columns: jobs[0].seeds.len(),
-            triangles: None,
-            alone: None,
+            triangles: vec![],
+            alone: vec![],
         }
     }
 
@@ -78,9 +85,15 @@ impl<'o> Absorber<'o> {
     }
 
     fn absorb_rows(&mut self, lanes: usize, width: Width, rows: &mut [f64], count: usize) {
-        match lanes {
-            1 => self.alone.get_or_insert_with(|| Alone::new(self.columns)).absorb(rows),
-            _ => self.triangles.get_or_insert_with(|| Triangles::with(width, self.columns, lanes)).absorb(rows, count),
+        let (columns, sets) = (self.columns, self.sets);
+        if lanes == 1 {
+            self.alone.resize_with(sets, || Alone::new(columns));
+            self.alone.iter_mut().enumerate().for_each(|(set, alone)| alone.absorb(rows, set, sets));
+            return;
+        }
+        self.triangles.resize_with(sets, || Triangles::with(width, columns, lanes));
+        for (set, triangles) in self.triangles.iter_mut().enumerate().take(count) {
+            triangles.absorb_every(&mut rows[set * (columns + 1) * lanes..], count - set, sets);
         }
     }
 
@@ -94,12 +107,15 @@ impl<'o> Absorber<'o> {
     /// Counts the rows of measurements.
     fn count(&mut self, window: &Window) {
         let (outputs, rows_of_each) = (window.outputs(), if window.has_variances() { 2 } else { 1 });
-        for (lane, rows) in self.rows.iter_mut().enumerate() {
-            *rows += rows_of_each
-                * match window.whole {
-                    true => (window.samples[lane] * outputs) as u64,
-                    false => window.measurements(lane),
-                };
+        for (lane, rows) in self.rows.chunks_mut(self.sets).enumerate() {
+            let of_each = outputs / self.sets;
+            for (set, rows) in rows.iter_mut().enumerate() {
+                *rows += rows_of_each
+                    * match window.whole {
+                        true => (window.samples[lane] * of_each) as u64,
+                        false => window.measurements(lane, set, self.sets),
+                    };
+            }
         }
     }
 
@@ -121,27 +137,29 @@ impl<'o> Absorber<'o> {
                 beside.iter_mut().skip((k * outputs + j) * lanes + lane).take(1).for_each(|one| *one *= first.0);
                 if window.has_variances() {
                     weigh(window.variance_row_mut(k, j), second);
-                    self.rows[lane] += 1;
                 }
-                self.rows[lane] += 1;
+                self.rows[lane * self.sets + j % self.sets] += if window.has_variances() { 2 } else { 1 };
             }
         }
     }
 
-    /// Cost and triangle of a job.
-    pub fn part(&mut self, lane: usize) -> (f64, Information) {
-        let sum = match (&self.alone, self.sums.get(lane)) {
-            (_, Some(sum)) => *sum,
-            (Some(alone), None) if self.plain => alone.squares,
-            _ => 0.0,
+    /// Cost and triangles of a job.
+    pub fn part(&mut self, lane: usize) -> (f64, Vec<Information>) {
+        let sum = match self.sums.get(lane) {
+            Some(sum) => *sum,
+            None if self.plain => self.alone.iter().map(|alone| alone.squares).sum(),
+            None => 0.0,
         };
         let cost = self.weighing[lane].cost + 0.5 * sum;
-        let triangle = match (&mut self.alone, &self.triangles) {
-            (Some(alone), _) => alone.triangle(),
-            (None, Some(triangles)) => triangles.triangle(lane),
-            (None, None) => Information::new(self.columns),
+        let triangle = |set: usize| {
+            let triangle = match (self.alone.get_mut(set), self.triangles.get(set)) {
+                (Some(alone), _) => alone.triangle(),
+                (None, Some(triangles)) => triangles.triangle(lane),
+                (None, None) => Information::new(self.columns),
+            };
+            triangle.of_rows(self.rows[lane * self.sets + set])
         };
-        (cost, triangle.of_rows(self.rows[lane]))
+        (cost, (0..self.sets).map(triangle).collect())
     }
 }
 
@@ -158,15 +176,18 @@ impl Alone {
         Alone { information: Information::new(columns), block: Block::new(columns, ROWS), squares: 0.0 }
     }
 
-    fn absorb(&mut self, mut rows: &[f64]) {
+    /// Absorbs the row of number `set` of every `sets` rows.
+    fn absorb(&mut self, mut rows: &[f64], set: usize, sets: usize) {
         let (width, capacity) = (self.block.columns() + 1, self.block.capacity());
+        let stride = width * sets;
         while !rows.is_empty() {
             let len = self.block.len();
-            let count = (capacity - len).min(rows.len() / width);
-            let (now, later) = rows.split_at(count * width);
+            let count = (capacity - len).min(rows.len() / stride);
+            let (now, later) = rows.split_at(count * stride);
             for column in 0..width {
                 let to = &mut self.block.column_mut(column)[len..len + count];
-                to.iter_mut().zip(now.iter().skip(column).step_by(width)).for_each(|(to, from)| *to = *from);
+                let from = now.iter().skip(set * width + column).step_by(stride);
+                to.iter_mut().zip(from).for_each(|(to, from)| *to = *from);
             }
             self.squares += sum_of_squares(&self.block.column_mut(width - 1)[len..len + count]);
             self.block.set_len(len + count);

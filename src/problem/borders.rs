@@ -58,7 +58,7 @@ impl Objective<'_> {
             return Ok(Some(found));
         }
         if slopes {
-            self.evaluate(coordinates)?;
+            self.evaluate_anew(coordinates)?;
             if let Some(found) = self.memory.at(coordinates) {
                 return Ok(Some(found));
             }

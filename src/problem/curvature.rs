@@ -133,7 +133,7 @@ struct Further<'f> {
 
 /// Triangles of jobs that run in parallel lanes.
 fn triangles(jobs: &[&Job<'_>], further: Vec<Further<'_>>) -> Result<Vec<Information>, Broken> {
-    let mut absorber = Absorber::new(jobs);
+    let mut absorber = Absorber::new(jobs, 1);
     let (mut beyond, mut along) = (vec![], vec![]);
     run(jobs, &mut |window| {
         let (lanes, outputs, columns) = (window.lanes(), window.outputs(), window.columns());
@@ -154,7 +154,7 @@ fn triangles(jobs: &[&Job<'_>], further: Vec<Further<'_>>) -> Result<Vec<Informa
             wide::run(window.width, Seconds { rows: window.rows_mut(), beyond, along: &along, columns, lanes });
         });
     })?;
-    Ok((0..jobs.len()).map(|lane| absorber.part(lane).1).collect())
+    Ok((0..jobs.len()).flat_map(|lane| absorber.part(lane).1).collect())
 }
 
 /// Puts the second derivatives of the errors in their place, by the errors there and further along, and the slopes of the predictions. Where nothing

@@ -150,10 +150,10 @@ impl Objective<'_> {
                 }
             }
             whole.scale_columns(&self.problem.unknowns.scales(e, coordinates));
-            found.blocks.push(whole);
+            found.blocks.push(vec![whole]);
             run_ins.of.push(places);
         }
-        if !found.cost.is_finite() || found.blocks.iter().any(|block| !block.is_finite()) {
+        if !found.cost.is_finite() || found.blocks.iter().flatten().any(|block| !block.is_finite()) {
             return Err(RunError::Failed { sample: 0 });
         }
         let (point, cost, values) = (coordinates.to_vec(), found.cost, values.to_vec());
@@ -266,7 +266,7 @@ mod tests {
             let row = |i: usize| (i..=last).map(move |j| block.at(i, j) * block.at(i, i).signum()).collect::<Vec<_>>();
             (0..=last).flat_map(row).collect::<Vec<_>>()
         };
-        found.blocks.iter().flat_map(of).collect()
+        found.blocks.iter().flatten().flat_map(of).collect()
     }
 
     /// Cost and triangles are those of segments with slopes with respect to their begins, as near as run-ins are tested for; at the first point the

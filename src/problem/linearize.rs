@@ -3,9 +3,10 @@
 use super::absorb::Absorber;
 use super::batches::{Broken, in_batches, run};
 use super::borders::Guess;
+use super::by_output::ByOutput;
 use super::job::Job;
 use super::segments::Borders;
-use super::{Free, Objective, Role, Values, Weighing};
+use super::{Free, Noise, Objective, Role, Values, Weighing, Whitening};
 use crate::information::{Chain, Information};
 use crate::optimize::{Infeasible, Linearization};
 use crate::parameter::Transform;
@@ -19,15 +20,23 @@ use std::sync::Arc;
 const FORGOTTEN: f64 = 1e-10;
 
 /// Cost, triangle and final carry of one segment.
-pub(super) struct Part {
+pub(super) struct Part<T = Information> {
     pub cost: f64,
-    pub triangle: Information,
+    pub triangle: T,
     pub reached: Reached,
 }
+
+/// With a triangle for each output, or one for all of them.
+pub(super) type PartByOutput = Part<Vec<Information>>;
 
 impl Objective<'_> {
     /// Cost and triangles of all experiments and the priors.
     pub(crate) fn evaluate(&self, coordinates: &[f64]) -> Result<Linearization, Infeasible> {
+        self.known_at(coordinates).map_or_else(|| self.evaluate_anew(coordinates), Ok)
+    }
+
+    /// The same by a pass, also where a point is known.
+    pub(super) fn evaluate_anew(&self, coordinates: &[f64]) -> Result<Linearization, Infeasible> {
         let found = self.evaluate_all(coordinates);
         match (&found, self.inside_bounds(coordinates)) {
             (Err(Infeasible::Failed(_)), Some(inside)) => inside.evaluate_all(coordinates).or(found),
@@ -45,7 +54,7 @@ impl Objective<'_> {
         if let Some(borders) = borders {
             self.memory.keep(Arc::new(borders));
         }
-        Ok(self.with_priors(coordinates, cost, blocks))
+        Ok(self.joined(coordinates, cost, blocks))
     }
 
     /// Triangles of segments with slopes with respect to their begins, where these are chained.
@@ -67,13 +76,56 @@ impl Objective<'_> {
     }
 
     /// The linearization of one record that was run uncut.
-    pub(super) fn linear_of(&self, coordinates: &[f64], part: Part) -> Result<Linearization, Infeasible> {
-        let Part { cost, mut triangle, .. } = part;
-        triangle.scale_columns(&self.problem.unknowns.scales(0, coordinates));
-        if !cost.is_finite() || !triangle.is_finite() {
+    pub(super) fn linear_of(&self, coordinates: &[f64], part: PartByOutput) -> Result<Linearization, Infeasible> {
+        let Part { cost, triangle: mut triangles, .. } = part;
+        let scales = self.problem.unknowns.scales(0, coordinates);
+        triangles.iter_mut().for_each(|triangle| triangle.scale_columns(&scales));
+        if !cost.is_finite() || !triangles.iter().all(Information::is_finite) {
             return Err(self.infeasible(0, RunError::Failed { sample: 0 }));
         }
-        Ok(self.with_priors(coordinates, cost, vec![triangle]))
+        Ok(self.joined(coordinates, cost, vec![triangles]))
+    }
+
+    /// The linearization of the triangles of all experiments, which are kept where each output has one: with other noise levels they are
+    /// other multiples of the same.
+    fn joined(&self, coordinates: &[f64], cost: f64, blocks: Vec<Vec<Information>>) -> Linearization {
+        if !self.keeps_outputs() || !self.left_out.is_empty() {
+            let blocks = blocks.into_iter().filter_map(|block| block.into_iter().next()).collect();
+            return self.with_priors(coordinates, cost, blocks);
+        }
+        let kept = Arc::new(ByOutput::new(coordinates, self.whitening.sigma(), blocks));
+        self.memory.keep_by_output(kept.clone());
+        self.with_priors(coordinates, cost, kept.blocks(&kept.sigma))
+    }
+
+    /// The linearization at a point that was evaluated with other noise levels.
+    pub(super) fn known_at(&self, coordinates: &[f64]) -> Option<Linearization> {
+        let known =
+            self.memory.by_output_at(coordinates).filter(|_| self.keeps_outputs() && self.left_out.is_empty())?;
+        let sigma = self.whitening.sigma();
+        let (cost, blocks) = (known.cost(&sigma), known.blocks(&sigma));
+        let finite = cost.is_finite() && blocks.iter().all(Information::is_finite);
+        finite.then(|| {
+            self.memory.revalue(coordinates, cost);
+            self.with_priors(coordinates, cost, blocks)
+        })
+    }
+
+    /// Whether the triangles of each output are kept, so that other noise levels need no pass.
+    pub(crate) fn keeps_outputs(&self) -> bool {
+        self.sets() > 1
+    }
+
+    /// How many triangles the rows are absorbed into: one for each output where the levels of independent noise are estimated, so that other levels need
+    /// no other pass; else one.
+    pub(super) fn sets(&self) -> usize {
+        let settings = &self.problem.settings;
+        let estimated = matches!(settings.noise, Noise::PerOutput | Noise::SomeGiven(_));
+        let plain = settings.loss.is_none() && settings.weights.is_none() && !self.sweep.predicts_variance();
+        match estimated && plain && matches!(self.whitening, Whitening::Diagonal(_)) {
+            true => self.outputs(),
+            false => 1,
+        }
     }
 
     /// Leaves out the slopes of initial states that have decayed before the first measurement, and returns these unknowns: a change by the size
@@ -143,7 +195,8 @@ impl Objective<'_> {
                 None => jobs.extend(self.independent_jobs(e, &values[e], coordinates, guess)),
             }
         }
-        let parts = in_batches(&jobs, |_, jobs| parts(jobs))
+        let sets = self.sets();
+        let parts = in_batches(&jobs, |_, jobs| parts_by_output(jobs, sets))
             .map_err(|(job, error)| self.infeasible(jobs[job].experiment, error))?;
         drop(jobs);
         let mut parts = parts.into_iter();
@@ -152,20 +205,21 @@ impl Objective<'_> {
         for (e, (chained, segments)) in chained.into_iter().zip(&cuts.segments).enumerate() {
             let mut parts = parts.by_ref().take(segments.len());
             if let Some(chained) = chained {
-                of.push(found.chain(chained, segments.len(), parts, guess, cuts.affine));
+                of.push(found.chain(chained, (segments.len(), sets), parts, guess, cuts.affine));
                 continue;
             }
             let Some(Part { cost, triangle: mut whole, .. }) = parts.next() else { continue };
             found.cost += cost;
             for part in parts {
                 found.cost += part.cost;
-                whole.merge(&part.triangle);
+                whole.iter_mut().zip(&part.triangle).for_each(|(whole, part)| whole.merge(part));
             }
-            whole.scale_columns(&self.problem.unknowns.scales(e, coordinates));
+            let scales = self.problem.unknowns.scales(e, coordinates);
+            whole.iter_mut().for_each(|triangle| triangle.scale_columns(&scales));
             found.blocks.push(whole);
             of.push(vec![]);
         }
-        if !found.cost.is_finite() || found.blocks.iter().any(|block| !block.is_finite()) {
+        if !found.cost.is_finite() || found.blocks.iter().flatten().any(|block| !block.is_finite()) {
             return Err(self.infeasible(0, RunError::Failed { sample: 0 }));
         }
         if guess.is_some() {
@@ -206,15 +260,22 @@ impl Objective<'_> {
 
 /// Costs and triangles of jobs that run in parallel lanes.
 pub(super) fn parts(jobs: &[&Job<'_>]) -> Result<Vec<Part>, Broken> {
-    let mut absorbers: Absorber<'_> = Absorber::new(jobs);
+    let first = |part: PartByOutput| {
+        let PartByOutput { cost, triangle, reached } = part;
+        triangle.into_iter().next().map(|triangle| Part { cost, triangle, reached })
+    };
+    Ok(parts_by_output(jobs, 1)?.into_iter().filter_map(first).collect())
+}
+
+/// Costs and triangles of jobs that run in parallel lanes, one triangle for each of `sets` outputs or one for all.
+pub(super) fn parts_by_output(jobs: &[&Job<'_>], sets: usize) -> Result<Vec<PartByOutput>, Broken> {
+    let mut absorbers: Absorber<'_> = Absorber::new(jobs, sets);
     let reached = run(jobs, &mut |window| absorbers.absorb(window))?;
-    let parts = reached.into_iter().enumerate();
-    parts
-        .map(|(lane, reached)| {
-            let (cost, triangle) = absorbers.part(lane);
-            Ok(Part { cost, triangle, reached })
-        })
-        .collect()
+    let part = |(lane, reached): (usize, Reached)| {
+        let (cost, triangle) = absorbers.part(lane);
+        Part { cost, triangle, reached }
+    };
+    Ok(reached.into_iter().enumerate().map(part).collect())
 }
 
 /// A record cut into segments, each of which is run with slopes with respect to its initial carry and the parameters.
@@ -267,7 +328,8 @@ pub(super) struct Triangulation {
     pub cost: f64,
     /// Sum of squares of what the correction of guessed borders changed.
     pub moved: f64,
-    pub blocks: Vec<Information>,
+    /// The triangles of each experiment: one for each output, or one for all of them.
+    pub blocks: Vec<Vec<Information>>,
     pub borders: Option<Borders>,
 }
 
@@ -276,33 +338,40 @@ impl Triangulation {
     fn chain(
         &mut self,
         of: Chained<'_>,
-        segments: usize,
-        parts: impl Iterator<Item = Part>,
+        (segments, sets): (usize, usize),
+        parts: impl Iterator<Item = PartByOutput>,
         guess: Option<&Borders>,
         affine: bool,
     ) -> Vec<Reached> {
         let Job { experiment, scales, piece: Piece { carry, slopes, .. }, .. } = of.whole;
         let carried = carry.len();
-        let mut chain = Chain::new(carried, segments, slopes.into_owned(), &of.parameters, &scales);
+        let chain = || Chain::new(carried, segments, slopes.to_vec(), &of.parameters, &scales);
+        let mut chains: Vec<Chain<'_>> = (0..sets).map(|_| chain()).collect();
         let right = guess.is_some_and(|guess| guess.right && !affine);
         let mut corrected = vec![];
         let mut simulated = 0.0;
         for (s, part) in parts.enumerate() {
             simulated += part.cost;
-            chain.add(&part.triangle);
+            chains.iter_mut().zip(&part.triangle).for_each(|(chain, triangle)| chain.add(triangle));
             if let Some(Reached { carry, .. }) = guess.and_then(|guess| guess.at(experiment, s + 1)) {
-                chain.go_on(&part.reached.carry, &part.reached.slopes, carry);
-                if right {
-                    chain.without_defect();
+                for chain in &mut chains {
+                    chain.go_on(&part.reached.carry, &part.reached.slopes, carry);
+                    if right {
+                        chain.without_defect();
+                    }
                 }
-                let (defect, slopes) = chain.begin();
+                let Some((defect, slopes)) = chains.first().map(Chain::begin) else { continue };
                 let carry = carry.iter().zip(defect).map(|(carry, defect)| carry + defect).collect();
                 corrected.push(Reached { carry, slopes: slopes.to_vec() });
             }
         }
-        self.moved += chain.moved;
-        self.cost += if chain.moved > 0.0 { 0.5 * chain.squares } else { simulated };
-        self.blocks.push(chain.triangle());
+        let moved: f64 = chains.iter().map(|chain| chain.moved).sum();
+        self.moved += moved;
+        self.cost += match moved > 0.0 {
+            true => 0.5 * chains.iter().map(|chain| chain.squares).sum::<f64>(),
+            false => simulated,
+        };
+        self.blocks.push(chains.into_iter().map(Chain::triangle).collect());
         corrected
     }
 }

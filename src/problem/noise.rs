@@ -1,6 +1,6 @@
 //! Noise levels from the prediction errors.
 
-use super::{Accumulate, At, Noise, Objective, Whitening, gather_together};
+use super::{Accumulate, At, Noise, Objective, Whitening, gather_together, linearize_together};
 use crate::information::SquareMatrix;
 use crate::loss::{Huber, Loss};
 use crate::optimize::Infeasible;
@@ -146,12 +146,21 @@ pub(crate) fn is_estimated(objective: &Objective<'_>) -> bool {
 
 /// The noise as given, or estimated from the errors at a point.
 pub(crate) fn first_whitening(objective: &Objective<'_>, coordinates: &[f64]) -> Result<Whitening, Infeasible> {
-    given(objective).map_or_else(|| estimate(objective, coordinates), Ok)
+    if let Some(given) = given(objective) {
+        return Ok(given);
+    }
+    // The search begins with the slopes there, which tell the errors too; where they fail, so does a pass without them, and says why.
+    if objective.keeps_outputs() {
+        let _ = objective.evaluate(coordinates);
+    }
+    estimate(objective, coordinates)
 }
 
 /// The noise of several objectives of one record each, as given or estimated.
 pub(crate) fn first_together(points: &[At<'_>]) -> Vec<Result<Whitening, Infeasible>> {
     let asked: Vec<At<'_>> = points.iter().copied().filter(|(objective, _)| given(objective).is_none()).collect();
+    let keeping: Vec<At<'_>> = asked.iter().copied().filter(|(objective, _)| objective.keeps_outputs()).collect();
+    linearize_together(&keeping);
     let mut estimated = estimate_together(&asked).into_iter();
     let first = |(objective, x): &At<'_>| match given(objective) {
         Some(given) => Ok(given),
@@ -171,6 +180,9 @@ fn given(objective: &Objective<'_>) -> Option<Whitening> {
 /// The noise estimated from the errors at a point: by their variance, or with a robust loss by Huber's proposal 2
 /// (Huber, *Robust Statistics*, 1981, section 6.4).
 pub(crate) fn estimate(objective: &Objective<'_>, coordinates: &[f64]) -> Result<Whitening, Infeasible> {
+    if let Some(known) = known_at(objective, coordinates) {
+        return Ok(known);
+    }
     let first = moments(((objective, coordinates), None))?;
     let mut level = Level::new(objective, first);
     while let Some(sigma) = level.clip() {
@@ -180,8 +192,31 @@ pub(crate) fn estimate(objective: &Objective<'_>, coordinates: &[f64]) -> Result
     Ok(level.whitening(objective))
 }
 
+/// The noise at a point at which the triangles of each output are known.
+fn known_at(objective: &Objective<'_>, coordinates: &[f64]) -> Option<Whitening> {
+    let variances = objective.memory.by_output_at(coordinates)?.variances();
+    // Sums below some 1e-280 count as zero in a triangle.
+    if variances.contains(&0.0) {
+        return None;
+    }
+    let moments = SquareMatrix::from_fn(variances.len(), |i, j| if i == j { variances[i] } else { 0.0 });
+    Some(Level::new(objective, moments).whitening(objective))
+}
+
 /// The noise estimated at a point of each of several objectives of one record each, in parallel lanes.
 pub(crate) fn estimate_together(points: &[At<'_>]) -> Vec<Result<Whitening, Infeasible>> {
+    let mut known: Vec<Option<Whitening>> = points.iter().map(|(objective, x)| known_at(objective, x)).collect();
+    let unknown = points.iter().zip(&known).filter(|(_, known)| known.is_none());
+    let mut measured = measured_together(&unknown.map(|(point, _)| *point).collect::<Vec<_>>()).into_iter();
+    let found = |(known, (objective, x)): (&mut Option<Whitening>, &At<'_>)| match known.take() {
+        Some(known) => Ok(known),
+        None => measured.next().unwrap_or_else(|| estimate(objective, x)),
+    };
+    known.iter_mut().zip(points).map(found).collect()
+}
+
+/// The noise estimated in passes over the records.
+fn measured_together(points: &[At<'_>]) -> Vec<Result<Whitening, Infeasible>> {
     let plain: Vec<Asked<'_>> = points.iter().map(|point| (*point, None)).collect();
     let first = moments_together(&plain).into_iter().zip(points);
     let mut levels: Vec<Result<Level, Infeasible>> =

@@ -7,6 +7,7 @@
 //! until what is left no longer matters, and simulated from the begin of the record where that does not succeed soon.
 
 use super::Values;
+use super::by_output::ByOutput;
 use crate::record::Record;
 use crate::sweep::{Coupling, Reached, Sweep};
 use std::ops::Range;
@@ -90,7 +91,8 @@ impl Borders {
     }
 }
 
-/// The borders at the last point that was evaluated, and at the best. A copy is independent of what it was copied from.
+/// The borders, and the triangles of each output, at the last point that was evaluated and at the best. A copy is independent of what it was copied
+/// from.
 #[derive(Debug, Default)]
 pub(crate) struct Memory(Mutex<Points>);
 
@@ -100,6 +102,12 @@ struct Points {
     best: Option<Arc<Borders>>,
     /// How many lengths of run-ins have turned out too short.
     run_in: usize,
+    /// The triangles of each output at the last point and at the best.
+    by_output: [Option<Arc<ByOutput>>; 2],
+}
+
+fn is_same(a: &[f64], b: &[f64]) -> bool {
+    a.len() == b.len() && a.iter().zip(b).all(|(a, b)| a.to_bits() == b.to_bits())
 }
 
 impl Memory {
@@ -117,11 +125,33 @@ impl Memory {
         *last = Some(borders);
     }
 
+    /// With other noise levels the cost of a point is this.
+    pub fn revalue(&self, point: &[f64], cost: f64) {
+        let Points { last, best, .. } = &mut *self.points();
+        for borders in [last, best].into_iter().flatten().filter(|borders| is_same(&borders.point, point)) {
+            Arc::make_mut(borders).cost = cost;
+        }
+    }
+
     /// The borders at exactly this point.
     pub fn at(&self, point: &[f64]) -> Option<Arc<Borders>> {
-        let same = |a: &[f64]| a.len() == point.len() && a.iter().zip(point).all(|(a, b)| a.to_bits() == b.to_bits());
         let Points { last, best, .. } = &*self.points();
-        [last, best].into_iter().flatten().find(|borders| same(&borders.point)).cloned()
+        [last, best].into_iter().flatten().find(|borders| is_same(&borders.point, point)).cloned()
+    }
+
+    /// Keeps the triangles of a point.
+    pub fn keep_by_output(&self, found: Arc<ByOutput>) {
+        let [last, best] = &mut self.points().by_output;
+        // Costs are compared with the same noise levels.
+        if best.as_ref().is_none_or(|best| found.cost(&found.sigma) <= best.cost(&found.sigma)) {
+            *best = Some(found.clone());
+        }
+        *last = Some(found);
+    }
+
+    /// The triangles of exactly this point.
+    pub fn by_output_at(&self, point: &[f64]) -> Option<Arc<ByOutput>> {
+        self.points().by_output.iter().flatten().find(|found| is_same(&found.point, point)).cloned()
     }
 
     /// The borders with slopes at the best point.

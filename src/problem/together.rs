@@ -2,7 +2,7 @@
 
 use super::batches::{Broken, in_batches};
 use super::job::Job;
-use super::linearize::parts;
+use super::linearize::parts_by_output;
 use super::pass::gather;
 use super::{Accumulate, Objective, Values};
 use crate::optimize::{Infeasible, Linearization};
@@ -12,11 +12,14 @@ pub(crate) type At<'o> = (&'o Objective<'o>, &'o [f64]);
 
 /// Cost and triangle of each. One that fails is evaluated alone.
 pub(crate) fn linearize_together(points: &[At<'_>]) -> Vec<Result<Linearization, Infeasible>> {
-    let mut answers: Vec<Option<Result<Linearization, Infeasible>>> = points.iter().map(|_| None).collect();
-    let run = |_: &[usize], jobs: &[&Job<'_>]| parts(jobs);
-    for (i, part) in together(points, true, run) {
-        let (objective, x) = points[i];
-        answers[i] = Some(objective.linear_of(x, part));
+    let mut answers: Vec<Option<Result<Linearization, Infeasible>>> =
+        points.iter().map(|(objective, x)| objective.known_at(x).map(Ok)).collect();
+    let unknown: Vec<usize> = (0..points.len()).filter(|i| answers[*i].is_none()).collect();
+    let asked: Vec<At<'_>> = unknown.iter().map(|&i| points[i]).collect();
+    let run = |_: &[usize], jobs: &[&Job<'_>]| parts_by_output(jobs, jobs[0].objective.sets());
+    for (i, part) in together(&asked, true, run) {
+        let (objective, x) = asked[i];
+        answers[unknown[i]] = Some(objective.linear_of(x, part));
     }
     let alone = |(answer, (objective, x)): (Option<_>, &At<'_>)| answer.unwrap_or_else(|| objective.evaluate(x));
     answers.into_iter().zip(points).map(alone).collect()

@@ -212,10 +212,10 @@ impl Window {
         self.measured[sample * self.outputs + output] >> lane & 1 == 1
     }
 
-    /// How many measurements a lane holds.
-    pub fn measurements(&self, lane: usize) -> u64 {
+    /// How many measurements a lane holds, of the first of every `step` outputs from number `first` on.
+    pub fn measurements(&self, lane: usize, first: usize, step: usize) -> u64 {
         let rows = &self.measured[..self.len() * self.outputs];
-        rows.iter().map(|lanes| u64::from(lanes >> lane & 1)).sum()
+        rows.iter().skip(first).step_by(step).map(|lanes| u64::from(lanes >> lane & 1)).sum()
     }
 
     /// Which lanes have measured an output at a sample, a bit each.

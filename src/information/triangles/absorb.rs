@@ -29,6 +29,8 @@ pub(super) struct Absorb<'a> {
     pub triangles: &'a mut [f64],
     /// `[row][column][lane]`.
     pub rows: &'a mut [f64],
+    /// The first of every so many rows is absorbed.
+    pub step: usize,
     /// Two numbers for each column, `[column][lane]` of eight lanes.
     pub factors: &'a mut [f64],
     /// Room for [`ROWS`] rows of eight lanes.
@@ -49,7 +51,7 @@ impl Absorb<'_> {
     /// `L` is the number of lanes of `W`, `GROUP` the most columns of a sweep.
     #[inline(always)]
     fn registers<W: Wide, const L: usize, const GROUP: usize>(self) {
-        let Absorb { columns, lanes, triangles, rows, factors, scratch } = self;
+        let Absorb { columns, lanes, triangles, rows, step, factors, scratch } = self;
         if lanes == 0 {
             return;
         }
@@ -58,33 +60,39 @@ impl Absorb<'_> {
         let (triangles, _) = triangles.as_chunks_mut::<L>();
         // Distance from one entry of a triangle to the next, in registers.
         let stride = lanes.next_multiple_of(8) / L;
-        for rows in rows.chunks_mut(ROWS * columns * lanes) {
+        for rows in rows.chunks_mut(ROWS * step * columns * lanes) {
             for first in (0..lanes).step_by(L) {
-                let rows = if lanes == L { rows.as_chunks_mut().0 } else { copied(rows, lanes, first, scratch) };
+                let rows = match (lanes == L, step) {
+                    (true, 1) => rows.as_chunks_mut().0,
+                    _ => copied(rows, (columns, step), lanes, first, scratch),
+                };
                 reflect::<W, L, GROUP>(&mut triangles[first / L..], stride, rows, columns, factors);
             }
         }
     }
 }
 
-/// The lanes of one register, from `first` on, side by side; beyond the last there are zeros.
+/// The lanes of one register, from `first` on, side by side, of the first of every `step` rows; beyond the last lane there are zeros.
 #[inline(always)]
 fn copied<'s, const L: usize>(
     rows: &[f64],
+    (columns, step): (usize, usize),
     lanes: usize,
     first: usize,
     scratch: &'s mut [[f64; L]],
 ) -> &'s mut [[f64; L]] {
     let mut count = 0;
-    for (from, to) in rows.chunks_exact(lanes).zip(scratch.iter_mut()) {
-        match from[first..].first_chunk() {
-            Some(from) => *to = *from,
-            None => {
-                *to = [0.0; L];
-                to[..lanes - first].copy_from_slice(&from[first..]);
+    for (row, to) in rows.chunks(columns * lanes).step_by(step).zip(scratch.chunks_mut(columns)) {
+        for (from, to) in row.chunks_exact(lanes).zip(to) {
+            match from[first..].first_chunk() {
+                Some(from) => *to = *from,
+                None => {
+                    *to = [0.0; L];
+                    to[..lanes - first].copy_from_slice(&from[first..]);
+                }
             }
         }
-        count += 1;
+        count += columns;
     }
     &mut scratch[..count]
 }
