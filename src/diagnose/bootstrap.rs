@@ -110,9 +110,11 @@ pub fn bootstrap(
         });
     }
     check_blocks(problem, &residuals, resampling)?;
+    let held = estimate.unknowns.iter().map(|unknown| unknown.knowledge.standard_error().is_none()).collect::<Vec<_>>();
+    let leverages = objective.is_weighted().then(|| leverages(&objective, &best, &held)).flatten();
     let weighted: Option<Vec<Vec<Vec<f64>>>> = objective.is_weighted().then(|| {
-        let leverages = leverages(&objective, &best).unwrap_or_default();
-        predictions.iter().enumerate().map(|(e, prediction)| freed(prediction, leverages.get(e))).collect()
+        let of = |e: usize| leverages.as_ref().and_then(|all| all.get(e));
+        predictions.iter().enumerate().map(|(e, prediction)| freed(prediction, of(e))).collect()
     });
     let refit = |number: usize| -> Option<Vec<f64>> {
         let mut random = Random::stream(seed, number as u64);
@@ -156,7 +158,7 @@ pub fn bootstrap(
         )));
     }
     // What weighted residuals have lost, the leverages gave back.
-    let lost = if weighted.is_some() { 0.0 } else { estimate.measurements as f64 - estimate.degrees_of_freedom() };
+    let lost = if leverages.is_some() { 0.0 } else { estimate.measurements as f64 - estimate.degrees_of_freedom() };
     Ok(spread(estimate, &found, (begun, lost), seed))
 }
 
@@ -270,7 +272,8 @@ fn block(resampling: Resampling, residuals: usize) -> usize {
 fn freed(prediction: &Simulated, leverages: Option<&Vec<f64>>) -> Vec<Vec<f64>> {
     let (samples, outputs) = (prediction.residuals.first().map_or(0, Vec::len), prediction.residuals.len());
     let at = |k: usize, j: usize| {
-        let (residual, leverage) = (prediction.residuals[j][k], leverages.map_or(0.0, |own| own[k * outputs + j]));
+        let leverage = leverages.map_or(0.0, |own| own[k * outputs + j]);
+        let (residual, leverage) = (prediction.residuals[j][k], if leverage.is_finite() { leverage } else { 0.0 });
         if residual.is_finite() { residual / (1.0 - leverage).max(LEAST) } else { 0.0 }
     };
     (0..samples).map(|k| (0..outputs).map(|j| at(k, j)).collect()).collect()

@@ -2,15 +2,16 @@
 
 use crate::covariance::leverage::{form, of_experiment};
 use crate::covariance::sandwich::Bread;
-use crate::problem::{Accumulate, Objective};
+use crate::problem::{Accumulate, Objective, Whitening};
 use crate::sweep::Window;
 use nalgebra::DMatrix;
 
 /// The leverage of each measurement in a weighted fit, by experiment: sample by sample, output by output; zero where nothing was measured.
-/// `None` without a curvature that has an inverse.
-pub(super) fn leverages(objective: &Objective<'_>, coordinates: &[f64]) -> Option<Vec<Vec<f64>>> {
+/// `None` without a curvature that has an inverse. Some unknowns are held. Outputs are taken as independent.
+pub(super) fn leverages(objective: &Objective<'_>, coordinates: &[f64], held: &[bool]) -> Option<Vec<Vec<f64>>> {
+    let objective = &objective.with(Whitening::Diagonal(objective.whitening.sigma()));
     let bread = Bread::weighted(objective, coordinates)?;
-    let inverse = bread.linear.covariance(&vec![false; coordinates.len()])?;
+    let inverse = bread.linear.covariance(held)?;
     let make = |experiment: usize| {
         let inverse = of_experiment(objective, &inverse, experiment);
         Leverages { objective, experiment, slopes: vec![0.0; inverse.nrows()], inverse, found: vec![] }

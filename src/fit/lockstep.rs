@@ -228,7 +228,7 @@ fn by_one_method(problems: &[From<'_>], control: &Control) -> Vec<Result<Summary
     let plain: Vec<Objective<'_>> = problems.iter().map(|(problem, _)| problem.in_units(control)).collect();
     let starts: Vec<At<'_>> =
         plain.iter().zip(problems).map(|(plain, (_, start))| (plain, &start.coordinates[..])).collect();
-    let first = |((plain, (problem, start)), noise): ((_, &From<'_>), Result<Whitening, Infeasible>)| match noise {
+    let first = |((plain, (problem, start)), noise): ((_, &From<'_>), Result<_, Infeasible>)| match noise {
         Ok(noise) => {
             let optimizer = problem.settings.optimizer.limited(start.trials);
             let rounds = Rounds::with(plain, &optimizer, start.coordinates.clone(), noise);

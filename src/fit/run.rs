@@ -130,7 +130,8 @@ impl Problem<'_> {
     /// A start that cannot be simulated.
     pub fn objective(&self) -> Result<Objective<'_>, Error> {
         let (plain, start) = (self.in_units(&NEVER), self.unknowns.start());
-        let whitening = noise::first_whitening(&plain, &start).map_err(|error| start_error(&plain, &start, error))?;
+        let found = noise::first_whitening(&plain, &start);
+        let (whitening, _) = found.map_err(|error| start_error(&plain, &start, error))?;
         Ok(plain.with(whitening))
     }
 

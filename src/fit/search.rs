@@ -27,14 +27,14 @@ pub(super) fn search(
     let mut rounds = match optimizer.resume(&checkpoint)? {
         Some((place, iterations, saved)) if place.len() == start.len() => {
             checkpoint.before = iterations;
-            let whitening = first_whitening(plain, &place)?;
-            Rounds::from(plain, optimizer, place, saved, whitening)
+            let noise = first_whitening(plain, &place)?;
+            Rounds::from(plain, optimizer, place, saved, noise)
         }
         // Written at once, so that a path that cannot be written is reported before the search.
         _ => {
             optimizer.begin(&checkpoint, &start)?;
-            let whitening = first_whitening(plain, &start)?;
-            Rounds::from(plain, optimizer, start, None, whitening)
+            let noise = first_whitening(plain, &start)?;
+            Rounds::from(plain, optimizer, start, None, noise)
         }
     };
     rounds.iterations = checkpoint.before;
@@ -85,19 +85,19 @@ pub(super) struct Rounds<'r> {
 impl<'r> Rounds<'r> {
     /// From a start. With noise estimated there, the first round need not find an exact minimum.
     pub fn new(plain: &'r Objective<'r>, optimizer: &Arc<dyn Optimizer>, start: Vec<f64>) -> Result<Self, Error> {
-        let whitening = first_whitening(plain, &start)?;
-        Ok(Rounds::with(plain, optimizer, start, whitening))
+        let noise = first_whitening(plain, &start)?;
+        Ok(Rounds::with(plain, optimizer, start, noise))
     }
 
-    /// From a start, with the noise there.
+    /// From a start, with the noise there and what is known of it.
     pub fn with(
         plain: &'r Objective<'r>,
         optimizer: &Arc<dyn Optimizer>,
         start: Vec<f64>,
-        whitening: Whitening,
+        noise: (Whitening, Memory),
     ) -> Self {
         let first = noise::is_estimated(plain).then(|| optimizer.rough());
-        Rounds::from(plain, optimizer, start, first, whitening)
+        Rounds::from(plain, optimizer, start, first, noise)
     }
 
     /// From a point; `first` is the search of the first round, if it differs.
@@ -106,18 +106,20 @@ impl<'r> Rounds<'r> {
         optimizer: &Arc<dyn Optimizer>,
         coordinates: Vec<f64>,
         first: Option<Arc<dyn Optimizer>>,
-        whitening: Whitening,
+        (whitening, memory): (Whitening, Memory),
     ) -> Self {
+        // A search without a limit of its own cannot be told to make one step.
+        let steps = plain.keeps_outputs() && optimizer.most() < u64::MAX;
         Rounds {
             plain,
             optimizer: optimizer.clone(),
             next: first.unwrap_or_else(|| optimizer.clone()),
             coordinates,
             whitening,
-            memory: plain.memory.clone(),
+            memory,
             known: !noise::is_estimated(plain),
             round: 0,
-            single: if plain.keeps_outputs() { SINGLE_STEPS } else { 0 },
+            single: if steps { SINGLE_STEPS } else { 0 },
             is_single: false,
             iterations: 0,
             left: optimizer.most(),
@@ -129,7 +131,9 @@ impl<'r> Rounds<'r> {
     fn run(mut self, file: Option<CheckpointFile>) -> Result<SearchEnd, Error> {
         loop {
             let objective = self.objective();
-            let result = self.next.round(&objective, self.coordinates.clone(), file.as_ref());
+            // A file from within a single step would be resumed with its limit.
+            let own = file.as_ref().filter(|_| !self.is_single);
+            let result = self.next.round(&objective, self.coordinates.clone(), own);
             let result = match (result, self.stopped()) {
                 (Err(RoundError::Start(Infeasible::Cancelled)), Some(end)) => {
                     let write_error = file.and_then(|file| file.write_error());
@@ -195,8 +199,9 @@ impl<'r> Rounds<'r> {
         noise: Option<Result<Whitening, Infeasible>>,
     ) -> Option<SearchEnd> {
         let is_step = self.is_step(&round);
-        // A step that was rejected is repeated by a search that remembers it.
-        if is_step && round.coordinates == self.coordinates {
+        // A step that was rejected is repeated by a search that remembers it; without triangles of each output, steps cost passes.
+        let rejected = is_step && round.coordinates == self.coordinates;
+        if rejected || !objective.memory.knows_outputs_at(&round.coordinates) {
             self.single = 0;
         }
         self.round += 1;
@@ -277,7 +282,7 @@ pub(super) fn at_end<'p>(plain: &Objective<'p>, end: &SearchEnd) -> Objective<'p
 }
 
 /// The noise of a search's first round.
-fn first_whitening(plain: &Objective<'_>, start: &[f64]) -> Result<Whitening, Error> {
+fn first_whitening(plain: &Objective<'_>, start: &[f64]) -> Result<(Whitening, Memory), Error> {
     noise::first_whitening(plain, start).map_err(|error| start_error(plain, start, error))
 }
 
@@ -341,7 +346,7 @@ fn roughness(here: f64, there: Option<f64>) -> f64 {
 mod tests {
     use super::{Rounds, roughness};
     use crate::optimize::{Infeasible, JacobianColumns, LevenbergMarquardt, Outcome, SearchLimit, Stop};
-    use crate::problem::{Control, Round, Whitening};
+    use crate::problem::{Control, Memory, Round, Whitening};
     use crate::tests::{Current, Gain, Line, Voltage};
     use crate::{Experiment, ExperimentOf, Fit, Huber, Time, free};
     use std::sync::Arc;
@@ -352,6 +357,10 @@ mod tests {
         let inputs: Vec<Voltage> = (0..40).map(|k| Voltage { u: f64::from(k) }).collect();
         let outputs = (0..40).map(|k| Current { i: 2.0 * f64::from(k) + f64::from(k * 37 % 21) }).collect();
         Experiment::new(&Line, Time::Uniform { start: 0.0, step: 1.0 }, inputs, outputs).unwrap()
+    }
+
+    fn noise() -> (Whitening, Memory) {
+        (Whitening::none(1), Memory::default())
     }
 
     /// The first of several rounds determines three digits. From a start that is right to three digits, the estimate equals that from a
@@ -392,7 +401,7 @@ mod tests {
         let record = record();
         let problem = Fit::new(&Line, &record).parameters(Gain { a: free(1.0) }).problem().unwrap();
         let plain = problem.in_units(&Control::NEVER);
-        let mut rounds = Rounds::with(&plain, &problem.settings.optimizer, vec![1.0], Whitening::none(1));
+        let mut rounds = Rounds::with(&plain, &problem.settings.optimizer, vec![1.0], noise());
         let mut take = || {
             let outcome = Outcome::CostUnchanged { decrease: 0.0 };
             let (coordinates, name) = (vec![1.0], String::new());
@@ -413,7 +422,7 @@ mod tests {
         let control = Control { cancel: Some(Arc::new(AtomicBool::new(true))), deadline: None };
         let plain = problem.in_units(&control);
         let rounds = || {
-            let mut rounds = Rounds::with(&plain, &problem.settings.optimizer, vec![1.0], Whitening::none(1));
+            let mut rounds = Rounds::with(&plain, &problem.settings.optimizer, vec![1.0], noise());
             rounds.known = false;
             rounds
         };

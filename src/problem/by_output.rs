@@ -21,6 +21,11 @@ impl ByOutput {
         ByOutput { point: point.to_vec(), sigma, triangles, squares }
     }
 
+    /// Whether each output has errors that a triangle resolves, in which sums of squares below some 1e-280 count as zero.
+    pub fn is_resolved(&self) -> bool {
+        self.squares.iter().all(|squares| *squares > 0.0)
+    }
+
     /// The mean square error of each output, in its unit.
     pub fn variances(&self) -> Vec<f64> {
         let rows = |j: usize| self.triangles.iter().map(|own| own[j].rows()).sum::<u64>().max(1);
@@ -58,7 +63,50 @@ mod tests {
     use crate::optimize::{LeastSquares, Linearization};
     use crate::pmsm::{Surface, Winding};
     use crate::problem::{Control, Whitening, noise};
-    use crate::{Experiment, ExperimentOf, Fit, Time, free};
+    use crate::{Experiment, ExperimentOf, Fit, Kind, Model, Nothing, Scalar, Time, free, signals};
+
+    signals! { struct Input { u: "V" } }
+    signals! { struct Outputs { y: "V", z: "V" } }
+    signals! { struct Parameters { a: "1", b: "1", c: "1" } }
+
+    /// Two outputs, one of which has a root of a parameter.
+    #[derive(Clone)]
+    struct Root;
+
+    impl Model for Root {
+        type State = Nothing;
+        type Input = Input;
+        type Output = Outputs;
+        type Parameters = Parameters;
+        const KIND: Kind = Kind::Static;
+
+        fn output<S: Scalar>(&self, _t: S, _x: &Nothing, u: &Input<S>, p: &Parameters<S>) -> Outputs<S> {
+            Outputs { y: p.a.sqrt() + p.b * u.u, z: p.c * u.u }
+        }
+    }
+
+    /// On its bound, where its slope is infinite, a parameter has no column; those of both outputs do. `z = u` and `c = 2`, so that the slope
+    /// of the cost along `c` is the sum of `u^2`, divided by the variance.
+    #[test]
+    fn a_slope_that_is_infinite_leaves_all_outputs() {
+        let inputs: Vec<Input> = (1..21).map(|k| Input { u: f64::from(k) }).collect();
+        let outputs = (1..21).map(|k| Outputs { y: f64::from(k) + 3.0, z: f64::from(k) }).collect();
+        let record = Experiment::new(&Root, Time::Uniform { start: 0.0, step: 1.0 }, inputs, outputs).unwrap();
+        let start = Parameters { a: free(0.0).within(0.0, 10.0), b: free(0.5), c: free(2.0) };
+        let problem = Fit::new(&Root, &record).parameters(start).problem().unwrap();
+        let objective = problem.objective().unwrap();
+        let linear = objective.linearize(&objective.start()).unwrap();
+        let sum: f64 = (1..21).map(|k| f64::from(k * k)).sum();
+        let variance = objective.whitening.sigma()[1].powi(2);
+        assert!((variance / (sum / 20.0) - 1.0).abs() < 1e-14, "{variance}");
+        let gradient = linear.gradient();
+        assert!(linear.rows() == 40 && gradient[0] == 0.0 && gradient[1].abs() > 1.0, "{gradient:?}");
+        assert!((gradient[2].abs() * variance / sum - 1.0).abs() < 1e-13, "{gradient:?}");
+        let found = problem.run().unwrap();
+        for (unknown, truth) in found.unknowns.iter().zip([9.0, 1.0, 1.0]) {
+            assert!((unknown.value / truth - 1.0).abs() < 1e-6, "{found}");
+        }
+    }
 
     /// Noise and linearization that follow from those at a point with other levels, and those of new passes.
     fn compare(records: &[ExperimentOf<Surface>]) {

@@ -135,7 +135,7 @@ impl Objective<'_> {
         if !chains.iter().zip(backs.iter().zip(&begins)).all(|(chain, (ends, begins))| chain.forgets(ends, begins)) {
             return Ok(None);
         }
-        let mut found = Triangulation { cost: 0.0, moved: 0.0, blocks: vec![], borders: None };
+        let mut found = Triangulation { cost: 0.0, moved: 0.0, by_output: vec![], blocks: vec![], borders: None };
         let mut run_ins = RunIns { part, of: vec![] };
         for (e, (fronts, backs)) in fronts.into_iter().zip(backs).enumerate() {
             let (mut places, mut backs) = (vec![], backs.into_iter());

@@ -66,7 +66,7 @@ impl Objective<'_> {
             Guess::Right(borders) => self.triangles(coordinates, values, borders.as_ref())?,
             Guess::Affine(borders, most) => {
                 let found = self.triangles(coordinates, values, Some(&borders))?;
-                match found.moved > most * 2.0 * found.cost {
+                match found.is_coarse(most) {
                     true => self.triangles(coordinates, values, found.borders.as_ref())?,
                     false => found,
                 }
@@ -89,19 +89,20 @@ impl Objective<'_> {
     /// The linearization of the triangles of all experiments, which are kept where each output has one: with other noise levels they are
     /// other multiples of the same.
     fn joined(&self, coordinates: &[f64], cost: f64, blocks: Vec<Vec<Information>>) -> Linearization {
-        if !self.keeps_outputs() || !self.left_out.is_empty() {
+        if !self.keeps_outputs() {
             let blocks = blocks.into_iter().filter_map(|block| block.into_iter().next()).collect();
             return self.with_priors(coordinates, cost, blocks);
         }
         let kept = Arc::new(ByOutput::new(coordinates, self.whitening.sigma(), blocks));
-        self.memory.keep_by_output(kept.clone());
-        self.with_priors(coordinates, cost, kept.blocks(&kept.sigma))
+        if kept.is_resolved() {
+            self.memory.keep_by_output(kept.clone());
+        }
+        self.with_priors(coordinates, kept.cost(&kept.sigma), kept.blocks(&kept.sigma))
     }
 
     /// The linearization at a point that was evaluated with other noise levels.
     pub(super) fn known_at(&self, coordinates: &[f64]) -> Option<Linearization> {
-        let known =
-            self.memory.by_output_at(coordinates).filter(|_| self.keeps_outputs() && self.left_out.is_empty())?;
+        let known = self.memory.by_output_at(coordinates).filter(|_| self.keeps_outputs())?;
         let sigma = self.whitening.sigma();
         let (cost, blocks) = (known.cost(&sigma), known.blocks(&sigma));
         let finite = cost.is_finite() && blocks.iter().all(Information::is_finite);
@@ -122,7 +123,8 @@ impl Objective<'_> {
         let settings = &self.problem.settings;
         let estimated = matches!(settings.noise, Noise::PerOutput | Noise::SomeGiven(_));
         let plain = settings.loss.is_none() && settings.weights.is_none() && !self.sweep.predicts_variance();
-        match estimated && plain && matches!(self.whitening, Whitening::Diagonal(_)) {
+        let whole = self.left_out.is_empty();
+        match estimated && plain && whole && matches!(self.whitening, Whitening::Diagonal(_)) {
             true => self.outputs(),
             false => 1,
         }
@@ -200,7 +202,8 @@ impl Objective<'_> {
             .map_err(|(job, error)| self.infeasible(jobs[job].experiment, error))?;
         drop(jobs);
         let mut parts = parts.into_iter();
-        let mut found = Triangulation { cost: 0.0, moved: 0.0, blocks: vec![], borders: None };
+        let by_output = vec![[0.0; 2]; if sets > 1 { sets } else { 0 }];
+        let mut found = Triangulation { cost: 0.0, moved: 0.0, by_output, blocks: vec![], borders: None };
         let mut of = Vec::with_capacity(chained.len());
         for (e, (chained, segments)) in chained.into_iter().zip(&cuts.segments).enumerate() {
             let mut parts = parts.by_ref().take(segments.len());
@@ -216,6 +219,9 @@ impl Objective<'_> {
             }
             let scales = self.problem.unknowns.scales(e, coordinates);
             whole.iter_mut().for_each(|triangle| triangle.scale_columns(&scales));
+            for ([_, squares], triangle) in found.by_output.iter_mut().zip(&whole) {
+                *squares += triangle.residual_at_zero();
+            }
             found.blocks.push(whole);
             of.push(vec![]);
         }
@@ -328,12 +334,22 @@ pub(super) struct Triangulation {
     pub cost: f64,
     /// Sum of squares of what the correction of guessed borders changed.
     pub moved: f64,
+    /// That sum, and the sum of squares, of each output where these have triangles of their own.
+    pub by_output: Vec<[f64; 2]>,
     /// The triangles of each experiment: one for each output, or one for all of them.
     pub blocks: Vec<Vec<Information>>,
     pub borders: Option<Borders>,
 }
 
 impl Triangulation {
+    /// Whether the correction changed more than this part of the squared errors, of all outputs or of one that has a triangle of its own.
+    fn is_coarse(&self, most: f64) -> bool {
+        match self.by_output.as_slice() {
+            [] => self.moved > most * 2.0 * self.cost,
+            outputs => outputs.iter().any(|[moved, squares]| *moved > most * squares),
+        }
+    }
+
     /// Joins the triangles of an experiment's segments, and returns the corrected borders.
     fn chain(
         &mut self,
@@ -364,6 +380,10 @@ impl Triangulation {
                 let carry = carry.iter().zip(defect).map(|(carry, defect)| carry + defect).collect();
                 corrected.push(Reached { carry, slopes: slopes.to_vec() });
             }
+        }
+        for ([moved, squares], chain) in self.by_output.iter_mut().zip(&chains) {
+            *moved += chain.moved;
+            *squares += chain.squares;
         }
         let moved: f64 = chains.iter().map(|chain| chain.moved).sum();
         self.moved += moved;

@@ -1,6 +1,6 @@
 //! Noise levels from the prediction errors.
 
-use super::{Accumulate, At, Noise, Objective, Whitening, gather_together, linearize_together};
+use super::{Accumulate, At, Memory, Noise, Objective, Whitening, gather_together, linearize_together};
 use crate::information::SquareMatrix;
 use crate::loss::{Huber, Loss};
 use crate::optimize::Infeasible;
@@ -144,29 +144,49 @@ pub(crate) fn is_estimated(objective: &Objective<'_>) -> bool {
     estimated && !only_scales(objective)
 }
 
-/// The noise as given, or estimated from the errors at a point.
-pub(crate) fn first_whitening(objective: &Objective<'_>, coordinates: &[f64]) -> Result<Whitening, Infeasible> {
+/// The noise as given, or estimated from the errors at a point; and what the estimate has found out about the point.
+pub(crate) fn first_whitening(
+    objective: &Objective<'_>,
+    coordinates: &[f64],
+) -> Result<(Whitening, Memory), Infeasible> {
     if let Some(given) = given(objective) {
-        return Ok(given);
+        return Ok((given, objective.memory.clone()));
     }
+    let scaled = in_sizes(objective);
     // The search begins with the slopes there, which tell the errors too; where they fail, so does a pass without them, and says why.
-    if objective.keeps_outputs() {
-        let _ = objective.evaluate(coordinates);
+    if scaled.keeps_outputs() {
+        let _ = scaled.evaluate(coordinates);
     }
-    estimate(objective, coordinates)
+    Ok((estimate(&scaled, coordinates)?, scaled.memory))
 }
 
 /// The noise of several objectives of one record each, as given or estimated.
-pub(crate) fn first_together(points: &[At<'_>]) -> Vec<Result<Whitening, Infeasible>> {
-    let asked: Vec<At<'_>> = points.iter().copied().filter(|(objective, _)| given(objective).is_none()).collect();
+pub(crate) fn first_together(points: &[At<'_>]) -> Vec<Result<(Whitening, Memory), Infeasible>> {
+    let scaled: Vec<Objective<'_>> = points.iter().map(|(objective, _)| in_sizes(objective)).collect();
+    let all = scaled.iter().zip(points);
+    let asked: Vec<At<'_>> =
+        all.filter(|(_, (objective, _))| given(objective).is_none()).map(|(scaled, (_, x))| (scaled, *x)).collect();
     let keeping: Vec<At<'_>> = asked.iter().copied().filter(|(objective, _)| objective.keeps_outputs()).collect();
     linearize_together(&keeping);
     let mut estimated = estimate_together(&asked).into_iter();
-    let first = |(objective, x): &At<'_>| match given(objective) {
-        Some(given) => Ok(given),
-        None => estimated.next().unwrap_or_else(|| estimate(objective, x)),
+    let first = |(scaled, (objective, x)): (&Objective<'_>, &At<'_>)| {
+        let whitening = match given(objective) {
+            Some(given) => given,
+            None => estimated.next().unwrap_or_else(|| estimate(scaled, x))?,
+        };
+        Ok((whitening, scaled.memory.clone()))
     };
-    points.iter().map(first).collect()
+    scaled.iter().zip(points).map(first).collect()
+}
+
+/// This objective with errors divided by the root mean square of their output's measurements, so that no unit counts, and a memory of its own.
+fn in_sizes<'p>(objective: &Objective<'p>) -> Objective<'p> {
+    let samples = objective.problem.samples().max(1) as f64;
+    let size = |squares: &f64| {
+        let size = (squares / samples).sqrt();
+        if size > SMALLEST && size.is_finite() { size } else { 1.0 }
+    };
+    objective.with(Whitening::Diagonal(objective.squares.iter().map(size).collect()))
 }
 
 /// The noise that the first round of a search has without an estimate.
@@ -195,10 +215,6 @@ pub(crate) fn estimate(objective: &Objective<'_>, coordinates: &[f64]) -> Result
 /// The noise at a point at which the triangles of each output are known.
 fn known_at(objective: &Objective<'_>, coordinates: &[f64]) -> Option<Whitening> {
     let variances = objective.memory.by_output_at(coordinates)?.variances();
-    // Sums below some 1e-280 count as zero in a triangle.
-    if variances.contains(&0.0) {
-        return None;
-    }
     let moments = SquareMatrix::from_fn(variances.len(), |i, j| if i == j { variances[i] } else { 0.0 });
     Some(Level::new(objective, moments).whitening(objective))
 }

@@ -149,6 +149,11 @@ impl Memory {
         *last = Some(found);
     }
 
+    /// Whether there are triangles of this point.
+    pub fn knows_outputs_at(&self, point: &[f64]) -> bool {
+        self.by_output_at(point).is_some()
+    }
+
     /// The triangles of exactly this point.
     pub fn by_output_at(&self, point: &[f64]) -> Option<Arc<ByOutput>> {
         self.points().by_output.iter().flatten().find(|found| is_same(&found.point, point)).cloned()
