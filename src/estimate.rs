@@ -77,7 +77,7 @@ pub struct Summary {
     pub deviance: Option<f64>,
     /// Trial steps of the search.
     pub iterations: u64,
-    /// Passes over the data with slopes.
+    /// Evaluations of the search with slopes that took a pass over the data.
     pub evaluations: u64,
     /// Time taken (s).
     #[serde(with = "crate::real")]

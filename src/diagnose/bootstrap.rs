@@ -114,7 +114,7 @@ pub fn bootstrap(
     let leverages = objective.is_weighted().then(|| leverages(&objective, &best, &held)).flatten();
     let weighted: Option<Vec<Vec<Vec<f64>>>> = objective.is_weighted().then(|| {
         let of = |e: usize| leverages.as_ref().and_then(|all| all.get(e));
-        predictions.iter().enumerate().map(|(e, prediction)| freed(prediction, of(e))).collect()
+        predictions.iter().enumerate().map(|(e, prediction)| deleted(prediction, of(e))).collect()
     });
     let refit = |number: usize| -> Option<Vec<f64>> {
         let mut random = Random::stream(seed, number as u64);
@@ -157,7 +157,7 @@ pub fn bootstrap(
             found.len()
         )));
     }
-    // What weighted residuals have lost, the leverages gave back.
+    // Residuals divided by one less their leverage need no factor for degrees of freedom.
     let lost = if leverages.is_some() { 0.0 } else { estimate.measurements as f64 - estimate.degrees_of_freedom() };
     Ok(spread(estimate, &found, (begun, lost), seed))
 }
@@ -268,8 +268,9 @@ fn block(resampling: Resampling, residuals: usize) -> usize {
     .clamp(1, residuals.max(1))
 }
 
-/// The residuals of all samples, divided by one less their leverage, which is what the fit took over of them; zero where there is none.
-fn freed(prediction: &Simulated, leverages: Option<&Vec<f64>>) -> Vec<Vec<f64>> {
+/// The deleted residuals of all samples: each divided by one less its leverage, as if the fit had been made without it. Zero where nothing
+/// was measured.
+fn deleted(prediction: &Simulated, leverages: Option<&Vec<f64>>) -> Vec<Vec<f64>> {
     let (samples, outputs) = (prediction.residuals.first().map_or(0, Vec::len), prediction.residuals.len());
     let at = |k: usize, j: usize| {
         let leverage = leverages.map_or(0.0, |own| own[k * outputs + j]);

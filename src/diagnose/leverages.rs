@@ -7,7 +7,7 @@ use crate::sweep::Window;
 use nalgebra::DMatrix;
 
 /// The leverage of each measurement in a weighted fit, by experiment: sample by sample, output by output; zero where nothing was measured.
-/// `None` without a curvature that has an inverse. Some unknowns are held. Outputs are taken as independent.
+/// `None` if the curvature has no inverse. Unknowns that are `held` have no part in it; noise that outputs share is left out.
 pub(super) fn leverages(objective: &Objective<'_>, coordinates: &[f64], held: &[bool]) -> Option<Vec<Vec<f64>>> {
     let objective = &objective.with(Whitening::Diagonal(objective.whitening.sigma()));
     let bread = Bread::weighted(objective, coordinates)?;

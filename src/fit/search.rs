@@ -57,8 +57,9 @@ const SINGLE_STEPS: u32 = 6;
 
 /// Searches with fixed noise, one after the other, with the noise estimated between them.
 ///
-/// The first determines three digits. Where other noise levels cost no pass, rounds of one trial step follow, each with the noise at its start: a step
-/// that lowers the cost lowers the likelihood's, since a logarithm is below its tangent. The last rounds go on until the noise has settled.
+/// The first determines three digits. Where other noise levels take no pass, rounds of one trial step follow, each with the noise estimated at its
+/// start. A step that lowers the sum of squares in units of that noise also lowers `sum N ln(sigma)`, the cost with the noise minimized out, because a
+/// logarithm is concave. The last rounds go on until the noise has settled.
 pub(super) struct Rounds<'r> {
     plain: &'r Objective<'r>,
     optimizer: Arc<dyn Optimizer>,
@@ -71,9 +72,11 @@ pub(super) struct Rounds<'r> {
     known: bool,
     round: u32,
     /// How many more rounds of one trial step may follow.
-    single: u32,
+    steps_left: u32,
     /// Whether the present round is one.
     is_single: bool,
+    /// Whether the triangles of each output are known where the present round begins, so that its first evaluation takes no pass.
+    begins_known: bool,
     iterations: u64,
     /// Trial steps that are left of the limit.
     left: u64,
@@ -89,7 +92,7 @@ impl<'r> Rounds<'r> {
         Ok(Rounds::with(plain, optimizer, start, noise))
     }
 
-    /// From a start, with the noise there and what is known of it.
+    /// From a start, with the noise there and the evaluations that it was estimated from.
     pub fn with(
         plain: &'r Objective<'r>,
         optimizer: &Arc<dyn Optimizer>,
@@ -119,8 +122,9 @@ impl<'r> Rounds<'r> {
             memory,
             known: !noise::is_estimated(plain),
             round: 0,
-            single: if steps { SINGLE_STEPS } else { 0 },
+            steps_left: if steps { SINGLE_STEPS } else { 0 },
             is_single: false,
+            begins_known: false,
             iterations: 0,
             left: optimizer.most(),
             evaluations: 0,
@@ -131,7 +135,7 @@ impl<'r> Rounds<'r> {
     fn run(mut self, file: Option<CheckpointFile>) -> Result<SearchEnd, Error> {
         loop {
             let objective = self.objective();
-            // A file from within a single step would be resumed with its limit.
+            // A checkpoint of a round of one step would be resumed with the limit of one step.
             let own = file.as_ref().filter(|_| !self.is_single);
             let result = self.next.round(&objective, self.coordinates.clone(), own);
             let result = match (result, self.stopped()) {
@@ -199,15 +203,17 @@ impl<'r> Rounds<'r> {
         noise: Option<Result<Whitening, Infeasible>>,
     ) -> Option<SearchEnd> {
         let is_step = self.is_step(&round);
-        // A step that was rejected is repeated by a search that remembers it; without triangles of each output, steps cost passes.
+        // After a step that was rejected, a whole search adapts its damping; without triangles of each output, each step would take a pass more.
         let rejected = is_step && round.coordinates == self.coordinates;
-        if rejected || !objective.memory.knows_outputs_at(&round.coordinates) {
-            self.single = 0;
+        let knows_end = objective.memory.knows_outputs_at(&round.coordinates);
+        if rejected || !knows_end {
+            self.steps_left = 0;
         }
         self.round += 1;
         self.iterations += round.iterations;
         self.left = self.left.saturating_sub(round.iterations);
-        self.evaluations += round.evaluations;
+        self.evaluations += round.evaluations.saturating_sub(u64::from(self.begins_known));
+        self.begins_known = knows_end && objective.keeps_outputs();
         self.coordinates = round.coordinates;
         let (mut outcome, mut linear) = (round.outcome, round.linear);
         let noise = match noise {
@@ -240,8 +246,8 @@ impl<'r> Rounds<'r> {
             }
             (outcome, _) => outcome,
         };
-        self.is_single = self.single > 0;
-        self.single = self.single.saturating_sub(1);
+        self.is_single = self.steps_left > 0;
+        self.steps_left = self.steps_left.saturating_sub(1);
         self.next = self.optimizer.limited(if self.is_single { self.left.min(1) } else { self.left });
         self.memory = objective.memory;
         let end = SearchEnd {

@@ -163,6 +163,8 @@ fn noise_that_is_estimated_takes_two_more_passes_at_most() {
     let (found, estimated) = passes(fit());
     let [id, iq] = [0, 1].map(|j: usize| found.outputs[j].fit.sigma);
     let (_, given) = passes(fit().noise(Currents { id, iq }));
+    // The estimate states no evaluation that took no pass; one pass with slopes is that of the verdict.
+    assert!(found.evaluations as f64 <= estimated[1] - 1.0, "{} {estimated:?}", found.evaluations);
     // Where a search begins, values are simulated for a part of the record.
     assert!(estimated[1] <= given[1] + 2.0 && estimated[0] <= given[0] + 0.5, "{estimated:?} {given:?}");
 }

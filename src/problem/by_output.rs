@@ -21,7 +21,7 @@ impl ByOutput {
         ByOutput { point: point.to_vec(), sigma, triangles, squares }
     }
 
-    /// Whether each output has errors that a triangle resolves, in which sums of squares below some 1e-280 count as zero.
+    /// Whether no output's sum of squares is zero, as which a triangle counts those below some 1e-280.
     pub fn is_resolved(&self) -> bool {
         self.squares.iter().all(|squares| *squares > 0.0)
     }

@@ -35,7 +35,7 @@ impl Objective<'_> {
         self.known_at(coordinates).map_or_else(|| self.evaluate_anew(coordinates), Ok)
     }
 
-    /// The same by a pass, also where a point is known.
+    /// [`evaluate`](Self::evaluate) in a pass over the data, whatever is kept of this point: it leaves the borders of segments in the memory.
     pub(super) fn evaluate_anew(&self, coordinates: &[f64]) -> Result<Linearization, Infeasible> {
         let found = self.evaluate_all(coordinates);
         match (&found, self.inside_bounds(coordinates)) {
@@ -86,8 +86,8 @@ impl Objective<'_> {
         Ok(self.joined(coordinates, cost, vec![triangles]))
     }
 
-    /// The linearization of the triangles of all experiments, which are kept where each output has one: with other noise levels they are
-    /// other multiples of the same.
+    /// The linearization of the triangles of all experiments. Where each output has one, they are kept: with other noise levels each is
+    /// multiplied by a number.
     fn joined(&self, coordinates: &[f64], cost: f64, blocks: Vec<Vec<Information>>) -> Linearization {
         if !self.keeps_outputs() {
             let blocks = blocks.into_iter().filter_map(|block| block.into_iter().next()).collect();

@@ -144,7 +144,7 @@ pub(crate) fn is_estimated(objective: &Objective<'_>) -> bool {
     estimated && !only_scales(objective)
 }
 
-/// The noise as given, or estimated from the errors at a point; and what the estimate has found out about the point.
+/// The noise as given, or estimated from the errors at a point, and the memory of the evaluation there.
 pub(crate) fn first_whitening(
     objective: &Objective<'_>,
     coordinates: &[f64],
@@ -153,14 +153,14 @@ pub(crate) fn first_whitening(
         return Ok((given, objective.memory.clone()));
     }
     let scaled = in_sizes(objective);
-    // The search begins with the slopes there, which tell the errors too; where they fail, so does a pass without them, and says why.
+    // The search begins with an evaluation there, from which the errors follow; if it fails, the pass below returns the error.
     if scaled.keeps_outputs() {
         let _ = scaled.evaluate(coordinates);
     }
     Ok((estimate(&scaled, coordinates)?, scaled.memory))
 }
 
-/// The noise of several objectives of one record each, as given or estimated.
+/// [`first_whitening`] of several objectives of one record each.
 pub(crate) fn first_together(points: &[At<'_>]) -> Vec<Result<(Whitening, Memory), Infeasible>> {
     let scaled: Vec<Objective<'_>> = points.iter().map(|(objective, _)| in_sizes(objective)).collect();
     let all = scaled.iter().zip(points);
@@ -179,7 +179,8 @@ pub(crate) fn first_together(points: &[At<'_>]) -> Vec<Result<(Whitening, Memory
     scaled.iter().zip(points).map(first).collect()
 }
 
-/// This objective with errors divided by the root mean square of their output's measurements, so that no unit counts, and a memory of its own.
+/// A copy, with its own memory, whose errors are divided by the root mean square of their output's measurements: outputs in any units then
+/// weigh alike.
 fn in_sizes<'p>(objective: &Objective<'p>) -> Objective<'p> {
     let samples = objective.problem.samples().max(1) as f64;
     let size = |squares: &f64| {

@@ -125,7 +125,7 @@ impl Memory {
         *last = Some(borders);
     }
 
-    /// With other noise levels the cost of a point is this.
+    /// Sets the cost that is kept with the borders at a point, after the noise levels have changed.
     pub fn revalue(&self, point: &[f64], cost: f64) {
         let Points { last, best, .. } = &mut *self.points();
         for borders in [last, best].into_iter().flatten().filter(|borders| is_same(&borders.point, point)) {

@@ -61,7 +61,7 @@ impl<const N: usize> Products<N> {
 
 /// Powers of one regressor, `1, z, z^2, z^3`.
 impl Products<SHAPE> {
-    /// Adds those of values, errors, and ones where there is an error, in whose place a zero stands elsewhere.
+    /// Adds the products of a series. `present` is one where there is an error; elsewhere it is zero, and so is the error.
     pub fn take_powers(&mut self, values: &[f64], errors: &[f64], present: &[f64]) {
         let sums = sums([errors, values, present], Powers);
         let (regressors, rest) = sums.split_at(POWERS);
@@ -77,7 +77,7 @@ impl Products<SHAPE> {
     }
 }
 
-/// Powers that products of two regressors are.
+/// How many powers the products of two regressors are.
 const POWERS: usize = 2 * SHAPE - 1;
 
 /// Sums of `z^i`, of `e^2 z^i` and of `e z^i`.
@@ -114,7 +114,8 @@ pub(crate) struct Change {
 }
 
 impl Change {
-    /// Adds those of the differences between two series of values, of errors, and of ones where there is an error.
+    /// Adds the sums of a series, whose regressor is `values - before`. `present` is one where there is an error; elsewhere it is zero, and so
+    /// is the error.
     pub fn take_differences(&mut self, values: &[f64], before: &[f64], errors: &[f64], present: &[f64]) {
         let [squares, fourths, product, own, mixed] = sums([errors, values, before, present], Differences);
         self.squares += squares;
