@@ -11,4 +11,4 @@ mod summary;
 mod tests;
 
 pub(crate) use checks::{Aliases, INDISTINGUISHABLE};
-pub(crate) use conclude::{conclude, conclude_from};
+pub(crate) use conclude::{conclude, conclude_together};

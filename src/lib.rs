@@ -189,6 +189,8 @@ pub mod report;
 #[cfg(feature = "std")]
 mod residuals;
 #[cfg(feature = "std")]
+mod rows;
+#[cfg(feature = "std")]
 mod scaling;
 #[cfg(feature = "std")]
 mod section;

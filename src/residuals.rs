@@ -139,7 +139,7 @@ pub(crate) fn residuals_together(points: &[At<'_>]) -> Vec<Option<Residuals>> {
 fn residuals(objective: &Objective<'_>, coordinates: &[f64], all: &mut [Sums<'_>], step_error: f64) -> Residuals {
     let first_errors: Vec<FirstErrors> = all
         .iter_mut()
-        .map(|one| std::mem::replace(&mut one.first_errors, FirstErrors::new(0, 0)))
+        .map(|one| std::mem::replace(&mut one.first_errors, FirstErrors::new(0, 0, 0)))
         .filter(|first| first.errors.first().is_some_and(|errors| !errors.is_empty()))
         .collect();
     let (first_errors, standardized_errors) =

@@ -8,12 +8,11 @@ use super::stages::Led;
 use crate::covariance::SearchEnd;
 use crate::error::Error;
 use crate::estimate::Summary;
-use crate::judge::{conclude, conclude_from};
+use crate::judge::conclude_together;
 use crate::optimize::{Domain, Infeasible, Linearization, Machine, Outcome, Request};
 use crate::problem::{
     At, Bend, Control, Objective, Problem, Round, Whitening, curvatures_together, each, linearize_together, noise,
 };
-use crate::residuals::residuals_together;
 use std::time::Instant;
 
 /// A search that has not ended.
@@ -256,7 +255,7 @@ fn by_one_method(problems: &[From<'_>], control: &Control) -> Vec<Result<Summary
         bend(&mut stages);
     }
     let starts: Vec<&Start> = problems.iter().map(|(_, start)| start).collect();
-    conclude_together(&plain, stages, &starts, control, begin)
+    summaries(&plain, stages, &starts, control, begin)
 }
 
 /// Passes on the second derivatives that searches request, of all in one pass.
@@ -287,7 +286,7 @@ fn measure(stages: &mut [Stage<'_>]) {
     }
 }
 
-fn conclude_together(
+fn summaries(
     plain: &[Objective<'_>],
     stages: Vec<Stage<'_>>,
     starts: &[&Start],
@@ -304,21 +303,15 @@ fn conclude_together(
         _ => None,
     };
     let objectives: Vec<Option<Objective<'_>>> = stages.iter().zip(plain).map(ended).collect();
-    let points = stages.iter().zip(&objectives).filter_map(|(stage, objective)| match (stage, objective) {
-        (Stage::Ended(end), Some(objective)) => Some((objective, &end.coordinates[..])),
+    let ends = stages.iter().zip(&objectives).filter_map(|(stage, objective)| match (stage, objective) {
+        (Stage::Ended(end), Some(objective)) => Some((objective, &**end)),
         _ => None,
     });
-    let mut residuals = residuals_together(&points.collect::<Vec<_>>()).into_iter();
     let seconds = begin.elapsed().as_secs_f64() / plain.len() as f64;
-    let finish = |i: usize| match (&stages[i], &objectives[i]) {
-        (Stage::Ended(end), Some(objective)) => {
-            let found = match residuals.next().flatten() {
-                Some(residuals) => conclude_from(objective, end, residuals, seconds),
-                None => conclude(objective, end, seconds),
-            };
-            found.map(|found| after_stages(found, starts[i].stages.as_ref()))
-        }
-        _ => plain[i].problem.run_within(Instant::now(), control, starts[i].clone()),
+    let mut found = conclude_together(&ends.collect::<Vec<_>>(), seconds).into_iter();
+    let finish = |i: usize| match objectives[i].as_ref().and_then(|_| found.next()) {
+        Some(found) => found.map(|found| after_stages(found, starts[i].stages.as_ref())),
+        None => plain[i].problem.run_within(Instant::now(), control, starts[i].clone()),
     };
     (0..plain.len()).map(finish).collect()
 }

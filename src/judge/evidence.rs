@@ -4,11 +4,7 @@ pub(crate) mod color;
 pub(crate) mod extended;
 pub(crate) mod left;
 pub(crate) mod parts;
-pub(crate) mod pieces;
-pub(crate) mod rows;
 pub(crate) mod ruled_out;
-pub(crate) mod sensors;
-pub(crate) mod spans;
 pub(crate) mod suspects;
 
 use crate::covariance::point::Point;
@@ -18,10 +14,10 @@ use crate::problem::{Noise, Whitening};
 use crate::residuals::Residuals;
 use crate::residuals::coupling::Coupled;
 use crate::residuals::whiteness::{WHITENESS_LEVEL, Whiteness, least_white};
+use crate::rows::{Asked, Rows, rows, rows_together};
 use color::is_certain;
 use left::{Left, left};
-use rows::{Asked, Rows, rows};
-use spans::records_by_chance;
+use parts::records_by_chance;
 use std::cell::OnceCell;
 
 /// Below this number of measurements the covariance is the classical one, whether the errors are autocorrelated, or of one size, or not.
@@ -84,13 +80,26 @@ impl<'e> Evidence<'e> {
 
     /// What a pass with slopes sums up for the covariance and the checks of this estimate.
     pub fn rows(&self) -> &Rows {
-        let Point { objective, end, held_for_covariance: held, .. } = &self.point;
+        let Point { objective, end, .. } = &self.point;
+        self.rows.get_or_init(|| rows(objective, &end.coordinates, self.asked()))
+    }
+
+    /// Makes these passes of several estimates of one record each in parallel lanes.
+    pub fn pass_together(all: &[&Self]) {
+        let points = all.iter().map(|one| ((one.point.objective, &one.point.end.coordinates[..]), one.asked()));
+        for (one, found) in all.iter().zip(rows_together(&points.collect::<Vec<_>>())) {
+            found.into_iter().for_each(|found| _ = one.rows.set(found));
+        }
+    }
+
+    /// What is asked of that pass.
+    fn asked(&self) -> Asked<'_> {
+        let held = &self.point.held_for_covariance;
         let colored = || self.unit().filter(|_| self.uses_hac()).map(|unit| (&held[..], unit));
         let shares = || self.unit().filter(|_| self.takes_one_size());
         let parts = || self.ruled_out(parts::UNLESS).is_none() && self.compare_parts();
-        let sensors = || self.ruled_out(sensors::UNLESS).is_none();
-        let asked = || Asked { shares: shares(), colored: colored(), sensors: sensors(), parts: parts() };
-        self.rows.get_or_init(|| rows(objective, &end.coordinates, asked()))
+        let sensors = || self.ruled_out(extended::UNLESS).is_none();
+        Asked { shares: shares(), colored: colored(), sensors: sensors(), parts: parts() }
     }
 
     /// What remains after the steps that parts of the data and sensors ask for.
@@ -124,9 +133,9 @@ impl<'e> Evidence<'e> {
         let objective = self.point.objective;
         let examine = || {
             let least = self.residuals.shape.iter().copied().fold(self.residuals.parts, f64::min);
-            let follow = least * (objective.outputs() as f64) < spans::LEVEL && !self.rounding;
+            let follow = least * (objective.outputs() as f64) < parts::LEVEL && !self.rounding;
             let unseen = self.residuals.shape.is_empty() && !self.rounding;
-            let apart = || !self.rounding && records_by_chance(&self.point) < spans::LEVEL;
+            let apart = || !self.rounding && records_by_chance(&self.point) < parts::LEVEL;
             let always = self.point.is_static() || objective.sweep.predicts_variance();
             follow || unseen || self.is_colored() || always || apart()
         };

@@ -3,7 +3,7 @@
 use super::absorb::Absorber;
 use super::batches::{Broken, in_batches, run};
 use super::job::Job;
-use super::together::{At, gather_together, together};
+use super::together::{At, Slopes, gather_together, together};
 use super::{Accumulate, Objective};
 use crate::information::Information;
 use crate::optimize::{Infeasible, Linearization};
@@ -57,7 +57,7 @@ pub(crate) fn curvatures_together(bends: &[Bend<'_>]) -> Vec<Option<Result<Linea
         columns.zip(scales(*i)).map(|(column, scale)| bends[*i].along[column] * scale).collect()
     };
     let along: Vec<Vec<f64>> = numbers.iter().map(along).collect();
-    let parts = together(&points, true, |members, jobs| {
+    let parts = together(&points, Slopes::OfQuantities, |members, jobs| {
         let further = |member: &usize| Further { beyond: beyond[*member], along: &along[*member] };
         triangles(jobs, members.iter().map(further).collect())
     });

@@ -51,6 +51,48 @@ impl<A: Accumulate> Accumulate for Vec<A> {
     }
 }
 
+/// An accumulator of the windows of segments that run in parallel lanes, all lanes together.
+pub(crate) trait AccumulateLanes {
+    /// What one lane has summed up to.
+    type Lane: Send;
+
+    /// Adds a window of standardized errors.
+    fn add(&mut self, window: &Window);
+
+    fn lane(&self, lane: usize) -> Self::Lane;
+
+    /// Adds the sum of the segment that follows.
+    fn append(lane: &mut Self::Lane, later: Self::Lane);
+}
+
+/// None.
+impl AccumulateLanes for () {
+    type Lane = ();
+
+    fn add(&mut self, _window: &Window) {}
+
+    fn lane(&self, _lane: usize) {}
+
+    fn append(_lane: &mut (), _later: ()) {}
+}
+
+/// One that a pass may leave out, in all segments alike.
+impl<L: AccumulateLanes> AccumulateLanes for Option<L> {
+    type Lane = Option<L::Lane>;
+
+    fn add(&mut self, window: &Window) {
+        self.iter_mut().for_each(|one| one.add(window));
+    }
+
+    fn lane(&self, lane: usize) -> Self::Lane {
+        self.as_ref().map(|one| one.lane(lane))
+    }
+
+    fn append(lane: &mut Self::Lane, later: Self::Lane) {
+        lane.iter_mut().zip(later).for_each(|(lane, later)| L::append(lane, later));
+    }
+}
+
 impl Objective<'_> {
     /// Initial state and parameters of each experiment.
     pub(super) fn values(&self, coordinates: &[f64]) -> Vec<Values> {
@@ -91,33 +133,49 @@ impl Objective<'_> {
         slopes: bool,
         make: impl Fn(usize) -> A + Sync,
     ) -> Result<Vec<A>, Infeasible> {
-        let found = self.gather_all(coordinates, slopes, &make);
+        let found = self.gather_beside(coordinates, slopes, make, |_| ())?;
+        Ok(found.into_iter().map(|(one, ())| one).collect())
+    }
+
+    /// The same pass, with an accumulator beside that takes all lanes together; it is made for the experiments of these.
+    pub(crate) fn gather_beside<A: Accumulate, L: AccumulateLanes>(
+        &self,
+        coordinates: &[f64],
+        slopes: bool,
+        make: impl Fn(usize) -> A + Sync,
+        beside: impl Fn(&[usize]) -> L + Sync,
+    ) -> Result<Vec<(A, L::Lane)>, Infeasible> {
+        let found = self.gather_all(coordinates, slopes, &make, &beside);
         match (&found, self.inside_bounds(coordinates)) {
             (Err(Infeasible::Failed(_)), Some(inside)) if slopes => {
-                inside.gather_all(coordinates, slopes, &make).or(found)
+                inside.gather_all(coordinates, slopes, &make, &beside).or(found)
             }
             _ => found,
         }
     }
 
-    fn gather_all<A: Accumulate>(
+    fn gather_all<A: Accumulate, L: AccumulateLanes>(
         &self,
         coordinates: &[f64],
         slopes: bool,
         make: &(impl Fn(usize) -> A + Sync),
-    ) -> Result<Vec<A>, Infeasible> {
+        beside: &(impl Fn(&[usize]) -> L + Sync),
+    ) -> Result<Vec<(A, L::Lane)>, Infeasible> {
         let values = self.values(coordinates);
         let borders = self.borders(coordinates, &values, slopes)?;
         let jobs = (0..self.experiments())
             .flat_map(|e| self.segments(e, &values[e], coordinates, slopes, borders.as_deref()))
             .collect();
-        let found = self.run_jobs(jobs, make)?;
-        let mut all: Vec<A> = Vec::with_capacity(self.experiments());
+        let found = self.run_jobs(jobs, make, beside)?;
+        let mut all: Vec<(A, L::Lane)> = Vec::with_capacity(self.experiments());
         let mut found = found.into_iter();
         for segments in &self.problem.cuts.segments {
             let mut parts = found.by_ref().take(segments.len());
             let Some(mut whole) = parts.next() else { break };
-            parts.for_each(|part| whole.append(part));
+            for (part, lane) in parts {
+                whole.0.append(part);
+                L::append(&mut whole.1, lane);
+            }
             all.push(whole);
         }
         Ok(all)
@@ -138,30 +196,38 @@ impl Objective<'_> {
         };
         let values = self.problem.unknowns.of_experiment(e, coordinates);
         let jobs = self.segments(e, &values, coordinates, slopes, borders.as_deref());
-        let mut found = self.run_jobs(jobs, &|_| make())?.into_iter();
+        let mut found = self.run_jobs(jobs, &|_| make(), &|_| ())?.into_iter().map(|(one, ())| one);
         let mut whole = found.next().unwrap_or_else(make);
         found.for_each(|part| whole.append(part));
         Ok(whole)
     }
 
     /// Runs jobs and accumulates the windows of each.
-    fn run_jobs<A: Accumulate>(
+    fn run_jobs<A: Accumulate, L: AccumulateLanes>(
         &self,
         jobs: Vec<Job<'_>>,
         make: &(impl Fn(usize) -> A + Sync),
-    ) -> Result<Vec<A>, Infeasible> {
-        let batch =
-            |_: &[usize], jobs: &[&Job<'_>]| gather(jobs, jobs.iter().map(|job| make(job.experiment)).collect());
+        beside: &(impl Fn(&[usize]) -> L + Sync),
+    ) -> Result<Vec<(A, L::Lane)>, Infeasible> {
+        let batch = |_: &[usize], jobs: &[&Job<'_>]| {
+            let experiments: Vec<usize> = jobs.iter().map(|job| job.experiment).collect();
+            gather(jobs, experiments.iter().map(|e| make(*e)).collect(), beside(&experiments))
+        };
         in_batches(&jobs, batch).map_err(|(job, error)| self.infeasible(jobs[job].experiment, error))
     }
 }
 
 /// Runs jobs and accumulates the windows of each.
-pub(super) fn gather<A: Accumulate>(jobs: &[&Job<'_>], mut gatherers: Vec<A>) -> Result<Vec<A>, Broken> {
+pub(super) fn gather<A: Accumulate, L: AccumulateLanes>(
+    jobs: &[&Job<'_>],
+    mut gatherers: Vec<A>,
+    mut beside: L,
+) -> Result<Vec<(A, L::Lane)>, Broken> {
     run(jobs, &mut |window| {
+        beside.add(window);
         for (lane, gatherer) in gatherers.iter_mut().enumerate().filter(|(lane, _)| window.samples[*lane] > 0) {
             gatherer.add(window, lane);
         }
-    })
-    .map(|_| gatherers)
+    })?;
+    Ok(gatherers.into_iter().enumerate().map(|(lane, one)| (one, beside.lane(lane))).collect())
 }

@@ -4,7 +4,7 @@ use super::batches::{Broken, in_batches};
 use super::job::Job;
 use super::linearize::parts_by_output;
 use super::pass::gather;
-use super::{Accumulate, Objective, Values};
+use super::{Accumulate, AccumulateLanes, Objective, Values};
 use crate::optimize::{Infeasible, Linearization};
 
 /// An objective of one record, and a point.
@@ -17,7 +17,7 @@ pub(crate) fn linearize_together(points: &[At<'_>]) -> Vec<Result<Linearization,
     let unknown: Vec<usize> = (0..points.len()).filter(|i| answers[*i].is_none()).collect();
     let asked: Vec<At<'_>> = unknown.iter().map(|&i| points[i]).collect();
     let run = |_: &[usize], jobs: &[&Job<'_>]| parts_by_output(jobs, jobs[0].objective.sets());
-    for (i, part) in together(&asked, true, run) {
+    for (i, part) in together(&asked, Slopes::OfQuantities, run) {
         let (objective, x) = asked[i];
         answers[unknown[i]] = Some(objective.linear_of(x, part));
     }
@@ -27,16 +27,40 @@ pub(crate) fn linearize_together(points: &[At<'_>]) -> Vec<Result<Linearization,
 
 /// The accumulator of each, in a pass without slopes; `None` for one that fails.
 pub(crate) fn gather_together<A: Accumulate>(points: &[At<'_>], make: impl Fn(usize) -> A + Sync) -> Vec<Option<A>> {
-    let mut answers: Vec<Option<A>> = points.iter().map(|_| None).collect();
-    let run = |members: &[usize], jobs: &[&Job<'_>]| gather(jobs, members.iter().map(|&i| make(i)).collect());
-    together(points, false, run).into_iter().for_each(|(i, gathered)| answers[i] = Some(gathered));
+    let found = gather_together_beside(points, Slopes::None, make, |_| ());
+    found.into_iter().map(|found| found.map(|(one, ())| one)).collect()
+}
+
+/// The same, with an accumulator beside that takes all lanes together; it is made for the points of these.
+pub(crate) fn gather_together_beside<A: Accumulate, L: AccumulateLanes>(
+    points: &[At<'_>],
+    slopes: Slopes,
+    make: impl Fn(usize) -> A + Sync,
+    beside: impl Fn(&[usize]) -> L + Sync,
+) -> Vec<Option<(A, L::Lane)>> {
+    let mut answers: Vec<Option<(A, L::Lane)>> = points.iter().map(|_| None).collect();
+    let run = |members: &[usize], jobs: &[&Job<'_>]| {
+        let gatherers = members.iter().map(|&i| make(i)).collect();
+        gather(jobs, gatherers, beside(members))
+    };
+    together(points, slopes, run).into_iter().for_each(|(i, gathered)| answers[i] = Some(gathered));
     answers
+}
+
+/// With respect to what a pass has slopes.
+#[derive(Clone, Copy, PartialEq)]
+pub(crate) enum Slopes {
+    None,
+    /// The unknown quantities.
+    OfQuantities,
+    /// The coordinates of the search.
+    OfCoordinates,
 }
 
 /// Runs the records of all points; those that fail are left out, and the others run again without them.
 pub(super) fn together<T: Send>(
     points: &[At<'_>],
-    slopes: bool,
+    slopes: Slopes,
     run: impl Fn(&[usize], &[&Job<'_>]) -> Result<Vec<T>, Broken> + Sync,
 ) -> Vec<(usize, T)> {
     let of = |(objective, x): &At<'_>| objective.problem.unknowns.of_experiment(0, x);
@@ -45,8 +69,10 @@ pub(super) fn together<T: Send>(
     while !left.is_empty() {
         let job = |&i: &usize| {
             let (objective, x) = points[i];
-            let mut job = objective.job(0, &values[i], x, slopes);
-            job.scales.clear();
+            let mut job = objective.job(0, &values[i], x, slopes != Slopes::None);
+            if slopes == Slopes::OfQuantities {
+                job.scales.clear();
+            }
             job
         };
         let jobs: Vec<Job<'_>> = left.iter().map(job).collect();

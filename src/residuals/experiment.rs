@@ -69,7 +69,7 @@ impl<'s> Sums<'s> {
             first: None,
             sigma: objective.whitening.sigma(),
             points: vec![],
-            first_errors: FirstErrors::new(experiment, outputs),
+            first_errors: FirstErrors::new(experiment, outputs, objective.problem.records[experiment].len()),
             errors: vec![],
             tested: vec![],
             scales,

@@ -7,8 +7,8 @@ use crate::sweep::Window;
 const RECORDS: usize = 8;
 const SAMPLES: usize = 16_384;
 
-/// Errors of an experiment, output by output, sample by sample; `None` where nothing was measured.
-pub(crate) type Errors = Vec<Vec<Option<f64>>>;
+/// Errors of an experiment, output by output, sample by sample; NaN where nothing was measured.
+pub(crate) type Errors = Vec<Vec<f64>>;
 
 /// The first errors of an experiment.
 pub(crate) struct FirstErrors {
@@ -21,8 +21,9 @@ pub(crate) struct FirstErrors {
 }
 
 impl FirstErrors {
-    pub fn new(experiment: usize, outputs: usize) -> Self {
-        let (end, none) = (if experiment < RECORDS { SAMPLES } else { 0 }, vec![vec![]; outputs]);
+    /// Of an experiment of so many samples.
+    pub fn new(experiment: usize, outputs: usize, samples: usize) -> Self {
+        let (end, none) = (if experiment < RECORDS { samples.min(SAMPLES) } else { 0 }, vec![vec![]; outputs]);
         FirstErrors { end, errors: none.clone(), standardized: none }
     }
 
@@ -33,8 +34,13 @@ impl FirstErrors {
             return;
         }
         for (j, (kept, errors)) in self.errors.iter_mut().zip(errors.chunks_exact(samples)).enumerate() {
-            let in_units = |(k, error): (usize, &f64)| {
-                window.is_measured(k, j, lane).then(|| error * window.variance_root(k, j, lane))
+            if window.whole && !window.has_variances() {
+                kept.extend_from_slice(errors);
+                continue;
+            }
+            let in_units = |(k, error): (usize, &f64)| match window.is_measured(k, j, lane) {
+                true => error * window.variance_root(k, j, lane),
+                false => f64::NAN,
             };
             kept.extend(errors.iter().enumerate().map(in_units));
         }
@@ -42,14 +48,19 @@ impl FirstErrors {
             return;
         }
         for (j, (kept, errors)) in self.standardized.iter_mut().zip(errors.chunks_exact(samples)).enumerate() {
-            let divided = |(k, error): (usize, &f64)| window.is_measured(k, j, lane).then_some(*error);
+            let divided = |(k, error): (usize, &f64)| if window.is_measured(k, j, lane) { *error } else { f64::NAN };
             kept.extend(errors.iter().enumerate().map(divided));
         }
     }
 
     pub fn append(&mut self, later: FirstErrors) {
-        self.errors.iter_mut().zip(later.errors).for_each(|(errors, later)| errors.extend(later));
-        self.standardized.iter_mut().zip(later.standardized).for_each(|(errors, later)| errors.extend(later));
+        let all = self.errors.iter_mut().chain(&mut self.standardized);
+        for (errors, later) in all.zip(later.errors.into_iter().chain(later.standardized)) {
+            if !later.is_empty() {
+                errors.reserve_exact(self.end.saturating_sub(errors.len()).max(later.len()));
+                errors.extend(later);
+            }
+        }
     }
 }
 
@@ -67,7 +78,7 @@ pub(crate) fn errors(objective: &Objective<'_>, coordinates: &[f64], e: usize) -
         for k in 0..window.samples[0] {
             for (j, errors) in errors.iter_mut().enumerate() {
                 let error = window.error(k, j, 0);
-                errors.push((window.is_measured(k, j, 0) && error.is_finite()).then_some(error));
+                errors.push(if window.is_measured(k, j, 0) && error.is_finite() { error } else { f64::NAN });
             }
         }
         true

@@ -32,6 +32,7 @@ const LAYERS: &[(&str, &[&str])] = &[
     ("estimation: sections of a report", &["section"]),
     ("estimation: the result", &["estimate"]),
     ("estimation: sums over the data", &["residuals", "covariance"]),
+    ("estimation: sums over rows with slopes", &["rows"]),
     ("estimation: judgement", &["judge"]),
     ("estimation: the fit", &["fit"]),
     ("results", &["diagnose", "check"]),

@@ -4,8 +4,8 @@ use super::*;
 use crate::covariance::directions::{taking_part, undetermined};
 use crate::judge::checks::data::{constant, inspected};
 use crate::judge::evidence::extended::Extended;
-use crate::judge::evidence::sensors::{KINDS, Kind};
 use crate::record::{Inspection, Record};
+use crate::rows::sensors::{KINDS, Kind};
 use std::sync::Arc;
 
 pub(crate) const CONSTANT_INPUTS: Check = Check::new(

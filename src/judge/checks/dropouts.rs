@@ -44,12 +44,12 @@ fn split(runs: &[Vec<(f64, f64)>]) -> Option<[Errors; 2]> {
     (single && again * ROUNDED <= held.count).then_some(split)
 }
 
-/// The warning about an output with these errors, one run per record, `None` where nothing was measured.
-pub(crate) fn dropouts_of(evidence: &Evidence<'_>, j: usize, errors: &[Vec<Option<f64>>]) -> Option<Warning> {
+/// The warning about an output with these errors, one run per record, NaN where nothing was measured.
+pub(crate) fn dropouts_of(evidence: &Evidence<'_>, j: usize, errors: &[Vec<f64>]) -> Option<Warning> {
     let problem = evidence.point.objective.problem;
-    let run = |(record, errors): (&crate::record::Record, &Vec<Option<f64>>)| {
-        let values = record.outputs()[j].values.iter().zip(errors);
-        values.filter_map(|(y, error)| Some((*y, (*error)?))).collect()
+    let run = |(record, errors): (&crate::record::Record, &Vec<f64>)| {
+        let values = record.outputs()[j].values.iter().copied().zip(errors.iter().copied());
+        values.filter(|(_, error)| !error.is_nan()).collect()
     };
     let runs: Vec<Vec<(f64, f64)>> = problem.records.iter().zip(errors).map(run).collect();
     let [held, others] = split(&runs)?;

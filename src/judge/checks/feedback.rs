@@ -30,9 +30,9 @@ impl Feedback {
         let controls = 1 + BEFORE * (inputs + outputs);
         let mut found: Vec<Gathering> = (0..inputs).map(|_| Gathering::new(controls + outputs)).collect();
         for (record, errors) in problem.records.iter().zip(&evidence.residuals.first_errors) {
-            let rows = (BEFORE..errors[0].len()).filter_map(|k| {
-                let now: Option<Vec<f64>> = errors.iter().map(|errors| errors[k]).collect();
-                Some((k, [before(record, k), now?].concat()))
+            let rows = (BEFORE..errors[0].len()).map(|k| {
+                let now: Vec<f64> = errors.iter().map(|errors| errors[k]).collect();
+                (k, [before(record, k), now].concat())
             });
             let rows: Vec<_> = rows.filter(|(_, row)| row.iter().all(|value| value.is_finite())).collect();
             for (found, input) in found.iter_mut().zip(record.inputs.iter()) {
@@ -83,9 +83,8 @@ impl Feedback {
             let all = |objective| errors(objective, &evidence.point.end.coordinates, e);
             let (before, after) = (all(evidence.point.objective), all(&objective));
             let outputs = record.outputs.iter().zip(before.iter().zip(&after)).map(|(output, (before, after))| {
-                let change =
-                    |(before, after): (&Option<f64>, &Option<f64>)| before.zip(*after).map_or(0.0, |(b, a)| b - a);
-                let changes = before.iter().zip(after).map(change);
+                let changes = before.iter().zip(after).map(|(before, after)| before - after);
+                let changes = changes.map(|change| if change.is_nan() { 0.0 } else { change });
                 output
                     .with(output.values.iter().zip(changes).map(|(value, change)| value + change).collect::<Vec<f64>>())
             });

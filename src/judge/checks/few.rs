@@ -3,7 +3,7 @@
 use super::*;
 use crate::covariance::shares::{DECIDES, Share, part};
 use crate::estimate::CovarianceMethod;
-use crate::judge::evidence::rows::{Asked, rows};
+use crate::rows::{Asked, rows};
 
 pub(crate) const DECIDED: Check = Check::new(
     "no measurement decides an interval",

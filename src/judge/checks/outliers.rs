@@ -54,7 +54,8 @@ fn outliers(evidence: &Evidence<'_>) -> Vec<Warning> {
         let residuals = &evidence.residuals;
         let predicted = evidence.point.objective.sweep.predicts_variance();
         let compared = if predicted { &residuals.standardized_errors } else { &residuals.first_errors };
-        let all: Vec<f64> = unsuspected(evidence, j, compared).into_iter().flatten().flatten().collect();
+        let all: Vec<f64> =
+            unsuspected(evidence, j, compared).into_iter().flatten().filter(|error| !error.is_nan()).collect();
         dropouts::dropouts_of(evidence, j, &unsuspected(evidence, j, &residuals.first_errors))
             .or_else(|| outliers_of(evidence, j, &all))
     };
@@ -63,10 +64,10 @@ fn outliers(evidence: &Evidence<'_>) -> Vec<Warning> {
 }
 
 /// The first errors of an output, record by record, without those of samples that the look at its column names.
-fn unsuspected(evidence: &Evidence<'_>, j: usize, first: &[Errors]) -> Vec<Vec<Option<f64>>> {
+fn unsuspected(evidence: &Evidence<'_>, j: usize, first: &[Errors]) -> Vec<Vec<f64>> {
     let of = |(e, one): (usize, &Errors)| {
         let errors = one[j].iter().enumerate();
-        errors.map(|(k, error)| error.filter(|_| !is_named(evidence, e, j, k))).collect()
+        errors.map(|(k, error)| if is_named(evidence, e, j, k) { f64::NAN } else { *error }).collect()
     };
     first.iter().enumerate().map(of).collect()
 }

@@ -1,10 +1,10 @@
 //! Whether parameters agree between parts of the data: from each output, from each record, from before and after a time in the records.
 
 use super::*;
-use crate::judge::evidence::parts::{APART, Difference, Into, Parts, UNLESS};
-use crate::judge::evidence::pieces::{Piece, Rows};
-use crate::judge::evidence::spans::{LEVEL, SPANS, span};
+use crate::judge::evidence::parts::{APART, Difference, Into, LEVEL, Parts, UNLESS};
 use crate::residuals::powers::COMPARED;
+use crate::rows::pieces::{Piece, Rows};
+use crate::rows::spans::{SPANS, span};
 
 pub(crate) const PARTS: Check = Check::new(
     "parts of the data agree",

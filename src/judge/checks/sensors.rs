@@ -3,9 +3,10 @@
 mod cut_off;
 
 use super::*;
+use crate::judge::evidence::extended::UNTESTED;
 use crate::judge::evidence::extended::{Extended, LEVEL, Released};
 use crate::judge::evidence::left::Sensor;
-use crate::judge::evidence::sensors::{KINDS, Kind, UNTESTED};
+use crate::rows::sensors::{KINDS, Kind};
 
 pub(crate) const SENSORS: Check = Check::new(
     "sensors have the model's gain, offset and delay",

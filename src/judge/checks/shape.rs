@@ -70,7 +70,7 @@ fn by_inputs(evidence: &Evidence<'_>) -> Option<Warning> {
             let mut order: Vec<usize> = (0..errors[0].len()).collect();
             order.sort_by(|a, b| input.values[*a].total_cmp(&input.values[*b]));
             for (j, errors) in errors.iter().enumerate() {
-                let sorted: Vec<f64> = order.iter().filter_map(|&k| errors[k]).collect();
+                let sorted: Vec<f64> = order.iter().map(|&k| errors[k]).filter(|error| !error.is_nan()).collect();
                 let mut own = Portmanteau::new(LAGS);
                 own.add(&sorted);
                 let (sum, errors) = &mut sums[i * count + j];
@@ -122,8 +122,11 @@ fn by_inputs_before(evidence: &Evidence<'_>) -> Option<Warning> {
             inputs.map(|(input, scale)| input.values[..samples].iter().map(|u| scale.one(*u)).collect()).collect();
         for (j, errors) in errors.iter().enumerate() {
             let numbers = errors.iter().enumerate().skip(BEFORE);
-            let (own, present): (Vec<f64>, Vec<f64>) =
-                numbers.map(|(k, error)| error.map_or((0.0, 0.0), |error| (weighted(e, j, k, error), 1.0))).unzip();
+            let one = |(k, error): (usize, &f64)| match error.is_nan() {
+                true => (0.0, 0.0),
+                false => (weighted(e, j, k, *error), 1.0),
+            };
+            let (own, present): (Vec<f64>, Vec<f64>) = numbers.map(one).unzip();
             for (input, sums) in inputs.iter().zip(sums.iter_mut().skip(j).step_by(outputs)) {
                 sums.take(input, &own, &present);
             }

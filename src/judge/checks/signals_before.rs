@@ -106,7 +106,7 @@ impl Series {
         for (j, errors) in errors.iter_mut().enumerate() {
             for (k, error) in errors.iter_mut().enumerate() {
                 let by_loss = |error: f64| objective.loss().map_or(1.0, |loss| loss.weight(error / sigma[j]));
-                *error = error.map(|error| error * objective.weight(e, k) * by_loss(error));
+                *error *= objective.weight(e, k) * by_loss(*error);
             }
         }
         Series { sums, errors, samples }
@@ -114,11 +114,11 @@ impl Series {
 }
 
 /// What was predicted for an output; where nothing was measured, for the measurement before.
-fn predictions(record: &Record, j: usize, errors: &[Option<f64>]) -> Vec<f64> {
+fn predictions(record: &Record, j: usize, errors: &[f64]) -> Vec<f64> {
     let measured = &record.outputs()[j].values;
     let mut last = 0.0;
     let all = errors.iter().zip(measured.iter()).map(|(error, y)| {
-        last = error.map_or(last, |error| y - error);
+        last = if error.is_nan() { last } else { y - error };
         last
     });
     all.collect()
@@ -169,7 +169,10 @@ impl Regression {
         for one in series {
             let mut before: Vec<f64> = vec![];
             for k in 0..one.samples {
-                let Some(error) = one.errors[j][k] else { continue };
+                let error = one.errors[j][k];
+                if error.is_nan() {
+                    continue;
+                }
                 if k >= longest && before.len() >= self.errors {
                     let last = before.iter().rev();
                     row[1..own].iter_mut().zip(last).for_each(|(to, error)| *to = *error);
@@ -230,7 +233,7 @@ mod tests {
             noise = 0.9 * noise + 0.3 * random.normal();
             let late = if k >= 7 { u[k - 7] } else { 0.0 };
             let error = noise + misfit * late;
-            errors.push(Some(error));
+            errors.push(error);
             reference = if k % 9 == 0 { random.normal() } else { reference };
             u.push(reference - gain * error);
         }

@@ -5,12 +5,24 @@
 //! Philosophical Society 44 (1948) 50).
 
 use super::Evidence;
-use super::sensors::{KINDS, Kind};
+use super::ruled_out::Unless;
 use crate::covariance::directions;
 use crate::estimate::Unknown;
 use crate::estimate::student::two_sided;
 use crate::optimize::Linearization;
 use crate::problem::Role;
+use crate::rows::sensors::{KINDS, Kind};
+
+/// What rules out that rows are extended, and that sensors are tested.
+pub(crate) const UNLESS: &[Unless] = &[Unless::Prefilter, Unless::Restarts, Unless::ManyUnknowns, Unless::NoMinimum];
+pub(crate) const UNTESTED: &[Unless] = &[
+    Unless::Prefilter,
+    Unless::Restarts,
+    Unless::ManyUnknowns,
+    Unless::NoMinimum,
+    Unless::NoFreedom(1.0),
+    Unless::RoundOff,
+];
 
 /// Level of the test, divided by the number of regressors.
 pub(crate) const LEVEL: f64 = 1e-4;

@@ -4,17 +4,16 @@
 //! one is therefore taken from those that remain when each part has taken its own step. A fault of a sensor is tested again for errors of
 //! changing variance (White, Econometrica 48 (1980) 817) and autocorrelated ones.
 
-mod of_pieces;
 mod of_sensor;
 
 use super::Evidence;
-use super::extended::{Extended, Released};
+use super::extended::{Extended, Released, UNTESTED};
 use super::parts::{Parts, parts};
-use super::pieces::Piece;
-use super::sensors::UNTESTED;
 use crate::problem::Whitening;
-use of_pieces::{OfPieces, inflations};
-use of_sensor::{OfSensor, Steps, confirm};
+use crate::rows::of_pieces::{OfPieces, inflations};
+use crate::rows::of_sensor::{OfSensor, SumOfSensor};
+use crate::rows::pieces::Piece;
+use of_sensor::{confirm, steps};
 
 /// What remains after the steps that are asked for.
 #[derive(Default)]
@@ -41,21 +40,19 @@ pub(crate) fn left(evidence: &Evidence<'_>) -> Left {
     let mut parts = parts(evidence);
     let extended = if evidence.ruled_out(UNTESTED).is_none() { Extended::new(evidence) } else { None };
     let suspects = extended.as_ref().and_then(|extended| Some((extended, extended.suspects()?)));
-    let steps = suspects.as_ref().and_then(|(extended, (found, _))| Steps::of(extended, found.first()?));
+    let steps = suspects.as_ref().and_then(|(extended, (found, _))| steps(extended, found.first()?));
     // Samples of static models have no order.
     let ordered: Vec<&[Piece]> = parts.iter().filter(|_| !point.is_static()).map(|parts| &parts.pieces[..]).collect();
     if ordered.is_empty() && steps.is_none() {
         return Left { parts, sensor: None };
     }
-    let make = |e: usize| {
-        let of_pieces: Vec<OfPieces<'_>> = ordered.iter().map(|pieces| OfPieces::new(&single, pieces, e)).collect();
-        (of_pieces, steps.as_ref().map(|steps| OfSensor::new(&single, steps, e)))
-    };
-    let Ok(all) = single.gather(&point.end.coordinates, true, make) else { return Left::default() };
-    let (of_pieces, of_sensor): (Vec<Vec<OfPieces<'_>>>, Vec<Option<OfSensor<'_>>>) = all.into_iter().unzip();
+    let make = |e: usize| ordered.iter().map(|pieces| OfPieces::new(&single, pieces, e)).collect::<Vec<OfPieces<'_>>>();
+    let beside = |experiments: &[usize]| steps.as_ref().map(|steps| SumOfSensor::new(&single, steps, experiments));
+    let Ok(all) = single.gather_beside(&point.end.coordinates, true, make, beside) else { return Left::default() };
+    let (of_pieces, of_sensor): (Vec<Vec<OfPieces<'_>>>, Vec<Option<OfSensor>>) = all.into_iter().unzip();
     let inflations: Vec<Vec<f64>> =
         (0..ordered.len()).map(|number| inflations(of_pieces.iter().map(|one| &one[number]))).collect();
-    let of_sensor: Option<Vec<OfSensor<'_>>> = of_sensor.into_iter().collect();
+    let of_sensor: Option<Vec<OfSensor>> = of_sensor.into_iter().collect();
     let sensor = suspects.zip(of_sensor).and_then(|((extended, (found, tests)), all)| {
         let (standard_error, chance) = confirm(extended, found.first()?, all)?;
         Some(Sensor { found, tests, standard_error, chance })

@@ -8,20 +8,24 @@
 //! (1960) 324) is tested, at a level divided by their number.
 
 use super::Evidence;
-use super::pieces::{Piece, Rows, pieces};
 use super::ruled_out::Unless;
-use super::spans::{LEVEL, SPANS};
 use crate::covariance::point::Point;
 use crate::information::{Covariance, Information};
 use crate::optimize::Linearization;
 use crate::problem::Role;
 use crate::residuals::powers::COMPARED;
+use crate::rows::pieces::{Piece, Rows, pieces};
+use crate::rows::spans::SPANS;
 use crate::whiteness::chi_squared_tail;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 /// What rules out that parts are compared.
 pub(crate) const UNLESS: &[Unless] =
     &[Unless::Prefilter, Unless::ManyUnknowns, Unless::NoFreedom(0.0), Unless::NoMinimum];
+/// Level of the tests.
+pub(crate) const LEVEL: f64 = 1e-4;
+/// A pivot below this part of its column is rounding.
+const ROUNDING: f64 = 1e-11;
 /// The parameter that differs most between two pieces differs by so many standard errors at least, where the test has found a difference.
 pub(crate) const APART: f64 = 3.0;
 /// The fewest of the parts of a record before and after a time at which all may have changed.
@@ -136,6 +140,28 @@ fn significant(gain: f64, degrees: f64, of_noise: f64, ways: f64) -> Option<f64>
     let fisher = FisherSnedecor::new(degrees, of_noise).ok().filter(|_| of_noise < MANY);
     let chance = fisher.map_or_else(|| chi_squared_tail(gain, degrees), |fisher| fisher.sf((gain / degrees).max(0.0)));
     (ways * chance <= LEVEL).then_some(ways * chance)
+}
+
+/// The probability that records of one plant gain as much by steps of their own, by the slopes that a fit has of each.
+pub(crate) fn records_by_chance(point: &Point<'_>) -> f64 {
+    let (mut gain, mut left, mut own, mut rows) = (0.0, 0.0, 0.0, 0.0);
+    for (triangle, columns) in point.linear.columns() {
+        let kept: Vec<usize> = (0..columns.len()).filter(|&c| !point.undetermined.held[columns[c]]).collect();
+        let triangle = triangle.select(&kept);
+        let norms = triangle.column_norms();
+        let told = (0..kept.len()).filter(|&c| triangle.at(c, c).abs() > ROUNDING * norms[c]).count();
+        gain += triangle.residual_at_zero() - triangle.residual();
+        left += triangle.residual();
+        own += told as f64;
+        rows += triangle.rows() as f64;
+    }
+    let common = point.undetermined.held.iter().filter(|held| !**held).count() as f64;
+    let (steps, free) = (own - common, rows - own);
+    if steps < 1.0 || free < 1.0 || left <= 0.0 {
+        return 1.0;
+    }
+    let statistic = (gain / steps) / (left / free);
+    FisherSnedecor::new(steps, free).map_or(1.0, |fisher| fisher.sf(statistic.max(0.0)))
 }
 
 #[cfg(test)]

@@ -6,8 +6,8 @@
 use crate::judge::checks::data::{FEW, PART_OF_STEP, TIMES, distinct};
 use crate::judge::checks::*;
 use crate::judge::evidence::extended::Extended;
-use crate::judge::evidence::sensors::{KINDS, Kind};
 use crate::optimize::Linearization;
+use crate::rows::sensors::{KINDS, Kind};
 
 /// With more values than these (6 bits) the offset of half a step is below a hundredth of the range.
 const MOST: usize = 64;

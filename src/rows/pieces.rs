@@ -3,8 +3,8 @@
 use crate::covariance::directions;
 use crate::covariance::point::Point;
 use crate::information::Information;
-use crate::judge::evidence::spans::Spans;
 use crate::optimize::Linearization;
+use crate::rows::spans::Spans;
 
 /// A record with fewer degrees of freedom than this has the noise of all records.
 const OWN: f64 = 30.0;

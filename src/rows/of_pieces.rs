@@ -1,9 +1,9 @@
 //! Correlation over time of the errors that remain in each piece of the data when it has taken its own step.
 
-use crate::judge::evidence::pieces::Piece;
-use crate::judge::evidence::spans::span;
 use crate::problem::{Accumulate, Objective};
 use crate::residuals::whiteness::{LAGS, Whiteness};
+use crate::rows::pieces::Piece;
+use crate::rows::spans::span;
 use crate::sweep::Window;
 use crate::whiteness::Portmanteau;
 
@@ -12,7 +12,7 @@ const OWN: u64 = 100;
 
 /// Correlations and number of errors.
 #[derive(Clone)]
-pub(super) struct Run {
+pub(crate) struct Run {
     sums: Portmanteau,
     pub count: u64,
 }
@@ -45,7 +45,7 @@ impl Run {
 }
 
 /// The errors of an experiment, piece by piece and output by output.
-pub(super) struct OfPieces<'p> {
+pub(crate) struct OfPieces<'p> {
     objective: &'p Objective<'p>,
     pieces: &'p [Piece],
     experiment: usize,
@@ -90,7 +90,7 @@ impl Accumulate for OfPieces<'_> {
 }
 
 /// How many errors have the information of one, by each piece: the most of its outputs.
-pub(super) fn inflations<'p>(all: impl Iterator<Item = &'p OfPieces<'p>>) -> Vec<f64> {
+pub(crate) fn inflations<'p>(all: impl Iterator<Item = &'p OfPieces<'p>>) -> Vec<f64> {
     let mut sums: Vec<Vec<Run>> = vec![];
     for one in all {
         match sums.is_empty() {

@@ -1,16 +1,10 @@
 //! The rows of each record in parts of equal length, output by output.
 
-use crate::covariance::point::Point;
 use crate::information::{Gathering, Information};
 use crate::problem::{Accumulate, Objective};
 use crate::sweep::Window;
-use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 use std::f64::consts::FRAC_1_SQRT_2;
 
-/// Level of the test.
-pub(crate) const LEVEL: f64 = 1e-4;
-/// A pivot below this part of its column is rounding.
-const ROUNDING: f64 = 1e-11;
 /// Spans of equal length of each record.
 pub(crate) const SPANS: usize = 16;
 /// Rows that are absorbed together, in each of many triangles.
@@ -86,28 +80,6 @@ impl Accumulate for SumSpans<'_> {
             part.sums.iter_mut().zip(later.sums).for_each(|(sum, later)| *sum += later);
         }
     }
-}
-
-/// The probability that records of one plant gain as much by steps of their own, by the slopes that a fit has of each.
-pub(crate) fn records_by_chance(point: &Point<'_>) -> f64 {
-    let (mut gain, mut left, mut own, mut rows) = (0.0, 0.0, 0.0, 0.0);
-    for (triangle, columns) in point.linear.columns() {
-        let kept: Vec<usize> = (0..columns.len()).filter(|&c| !point.undetermined.held[columns[c]]).collect();
-        let triangle = triangle.select(&kept);
-        let norms = triangle.column_norms();
-        let told = (0..kept.len()).filter(|&c| triangle.at(c, c).abs() > ROUNDING * norms[c]).count();
-        gain += triangle.residual_at_zero() - triangle.residual();
-        left += triangle.residual();
-        own += told as f64;
-        rows += triangle.rows() as f64;
-    }
-    let common = point.undetermined.held.iter().filter(|held| !**held).count() as f64;
-    let (steps, free) = (own - common, rows - own);
-    if steps < 1.0 || free < 1.0 || left <= 0.0 {
-        return 1.0;
-    }
-    let statistic = (gain / steps) / (left / free);
-    FisherSnedecor::new(steps, free).map_or(1.0, |fisher| fisher.sf(statistic.max(0.0)))
 }
 
 #[cfg(test)]
