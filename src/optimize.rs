@@ -118,9 +118,9 @@ pub struct Stop {
 }
 
 impl Stop {
-    /// Three digits of each unknown.
-    pub(crate) fn rough(self) -> Self {
-        Stop { step: self.step.max(1e-3), gradient: self.gradient.max(1e-3), ..self }
+    /// Tolerances of this size at least.
+    pub(crate) fn rough(self, tolerance: f64) -> Self {
+        Stop { step: self.step.max(tolerance), gradient: self.gradient.max(tolerance), ..self }
     }
 
     /// At most so many trial steps.
@@ -152,12 +152,12 @@ mod tests {
     use super::Stop;
 
     #[test]
-    fn a_rough_search_stops_at_three_digits() {
-        let Stop { step, gradient, cost, iterations } = Stop::default().rough();
+    fn a_rough_search_stops_early() {
+        let Stop { step, gradient, cost, iterations } = Stop::default().rough(1e-3);
         assert_eq!((step, gradient), (1e-3, 1e-3));
         assert_eq!((cost, iterations), (Stop::default().cost, Stop::default().iterations));
         let rougher = Stop { step: 0.1, gradient: 0.2, ..Stop::default() };
-        assert_eq!((rougher.rough().step, rougher.rough().gradient), (0.1, 0.2));
+        assert_eq!((rougher.rough(1e-3).step, rougher.rough(1e-3).gradient), (0.1, 0.2));
         assert_eq!([rougher.limited(7).iterations, Stop { iterations: 5, ..rougher }.limited(7).iterations], [7, 5]);
     }
 }

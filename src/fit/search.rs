@@ -52,13 +52,16 @@ pub(super) fn checkpoint(
     plain.problem.settings.checkpoint.as_ref().map(file).transpose()
 }
 
+/// Tolerance of the first round: three digits, or one where the next ones are single steps.
+const ROUGH: f64 = 1e-3;
+const ROUGH_BEFORE_STEPS: f64 = 0.1;
 /// Most rounds of one trial step.
 const SINGLE_STEPS: u32 = 6;
 
 /// Searches with fixed noise, one after the other, with the noise estimated between them.
 ///
-/// The first determines three digits. Where other noise levels take no pass, rounds of one trial step follow, each with the noise estimated at its
-/// start. A step that lowers the sum of squares in units of that noise also lowers `sum N ln(sigma)`, the cost with the noise minimized out, because a
+/// The first determines three digits. Where other noise levels take no pass it determines one, and rounds of one trial step follow, each with the noise
+/// estimated at its start. A step that lowers the sum of squares in units of that noise also lowers `sum N ln(sigma)`, the cost with the noise minimized out, because a
 /// logarithm is concave. The last rounds go on until the noise has settled.
 pub(super) struct Rounds<'r> {
     plain: &'r Objective<'r>,
@@ -99,7 +102,8 @@ impl<'r> Rounds<'r> {
         start: Vec<f64>,
         noise: (Whitening, Memory),
     ) -> Self {
-        let first = noise::is_estimated(plain).then(|| optimizer.rough());
+        let tolerance = if makes_steps(plain, optimizer) { ROUGH_BEFORE_STEPS } else { ROUGH };
+        let first = noise::is_estimated(plain).then(|| optimizer.rough(tolerance));
         Rounds::from(plain, optimizer, start, first, noise)
     }
 
@@ -111,8 +115,6 @@ impl<'r> Rounds<'r> {
         first: Option<Arc<dyn Optimizer>>,
         (whitening, memory): (Whitening, Memory),
     ) -> Self {
-        // A search without a limit of its own cannot be told to make one step.
-        let steps = plain.keeps_outputs() && optimizer.most() < u64::MAX;
         Rounds {
             plain,
             optimizer: optimizer.clone(),
@@ -122,7 +124,7 @@ impl<'r> Rounds<'r> {
             memory,
             known: !noise::is_estimated(plain),
             round: 0,
-            steps_left: if steps { SINGLE_STEPS } else { 0 },
+            steps_left: if makes_steps(plain, optimizer) { SINGLE_STEPS } else { 0 },
             is_single: false,
             begins_known: false,
             iterations: 0,
@@ -268,6 +270,11 @@ impl<'r> Rounds<'r> {
         self.last = Some(end);
         None
     }
+}
+
+/// Whether rounds of one step are made. A search without a limit of its own cannot be told to make one.
+fn makes_steps(plain: &Objective<'_>, optimizer: &Arc<dyn Optimizer>) -> bool {
+    plain.keeps_outputs() && optimizer.most() < u64::MAX
 }
 
 /// An end with the noise of the errors there: that of a search that did not converge is the noise where its last round began.

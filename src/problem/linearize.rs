@@ -26,6 +26,9 @@ pub(super) struct Part<T = Information> {
     pub reached: Reached,
 }
 
+/// By how much more, in parts, the correction of guessed borders may change the squared errors of one output than those of all.
+const OF_ONE: f64 = 5.0;
+
 /// With a triangle for each output, or one for all of them.
 pub(super) type PartByOutput = Part<Vec<Information>>;
 
@@ -342,11 +345,12 @@ pub(super) struct Triangulation {
 }
 
 impl Triangulation {
-    /// Whether the correction changed more than this part of the squared errors, of all outputs or of one that has a triangle of its own.
+    /// Whether the correction changed more than this part of the squared errors of all outputs; where each has a triangle of its own, whether it changed
+    /// more than [`OF_ONE`] times this part of those of one.
     fn is_coarse(&self, most: f64) -> bool {
         match self.by_output.as_slice() {
             [] => self.moved > most * 2.0 * self.cost,
-            outputs => outputs.iter().any(|[moved, squares]| *moved > most * squares),
+            outputs => outputs.iter().any(|[moved, squares]| *moved > OF_ONE * most * squares),
         }
     }
 

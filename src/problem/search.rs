@@ -24,8 +24,8 @@ pub trait Search:
     + for<'p> Solver<&'p Objective<'p>, LeastSquaresState>
     + 'static
 {
-    /// This search with loose tolerances (three digits), for a cost that changes in the next round.
-    fn rough(&self) -> Self;
+    /// This search with tolerances of this size at least, for a cost that changes in the next round.
+    fn rough(&self, tolerance: f64) -> Self;
 
     /// This search with at most so many trial steps, or the search itself if it has no such limit.
     fn limited(&self, iterations: u64) -> Self {
@@ -48,8 +48,8 @@ pub trait Search:
 }
 
 impl<S: Scaling + Serialize + DeserializeOwned + 'static> Search for LevenbergMarquardt<S> {
-    fn rough(&self) -> Self {
-        LevenbergMarquardt::new(self.stop.rough(), self.scaling.clone())
+    fn rough(&self, tolerance: f64) -> Self {
+        LevenbergMarquardt::new(self.stop.rough(tolerance), self.scaling.clone())
     }
 
     fn limited(&self, iterations: u64) -> Self {
@@ -66,8 +66,8 @@ impl<S: Scaling + Serialize + DeserializeOwned + 'static> Search for LevenbergMa
 }
 
 impl Search for GaussNewton {
-    fn rough(&self) -> Self {
-        GaussNewton::new(self.stop.rough())
+    fn rough(&self, tolerance: f64) -> Self {
+        GaussNewton::new(self.stop.rough(tolerance))
     }
 
     fn limited(&self, iterations: u64) -> Self {
@@ -106,7 +106,7 @@ pub(crate) enum RoundError {
 pub(crate) trait Optimizer: Send + Sync {
     fn check(&self) -> Result<(), Error>;
 
-    fn rough(&self) -> Arc<dyn Optimizer>;
+    fn rough(&self, tolerance: f64) -> Arc<dyn Optimizer>;
 
     fn limited(&self, iterations: u64) -> Arc<dyn Optimizer>;
 
@@ -144,8 +144,8 @@ impl<S: Search> Optimizer for S {
         Search::check(self)
     }
 
-    fn rough(&self) -> Arc<dyn Optimizer> {
-        Arc::new(Search::rough(self))
+    fn rough(&self, tolerance: f64) -> Arc<dyn Optimizer> {
+        Arc::new(Search::rough(self, tolerance))
     }
 
     fn limited(&self, iterations: u64) -> Arc<dyn Optimizer> {
