@@ -27,6 +27,12 @@ pub(crate) struct Asked<'a> {
     pub parts: bool,
 }
 
+impl Asked<'_> {
+    pub fn is_some(&self) -> bool {
+        self.shares.is_some() || self.colored.is_some() || self.sensors || self.parts
+    }
+}
+
 /// What is summed up over all measurements with their slopes.
 #[derive(Default)]
 pub(crate) struct Rows {
@@ -132,3 +138,6 @@ impl<'s> Summing<'s> {
         Rows { colored: self.frames.map(|frames| (frames, sums)), ..rows }
     }
 }
+
+#[cfg(test)]
+mod tests;

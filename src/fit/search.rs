@@ -58,10 +58,21 @@ const ROUGH_BEFORE_STEPS: f64 = 0.1;
 /// Most rounds of one trial step.
 const SINGLE_STEPS: u32 = 6;
 
+/// A round of a search.
+#[derive(Clone, Copy, PartialEq)]
+enum Kind {
+    /// To loose tolerances.
+    Rough,
+    /// One trial step.
+    Step,
+    /// To the tolerances of the search.
+    Whole,
+}
+
 /// Searches with fixed noise, one after the other, with the noise estimated between them.
 ///
-/// The first determines three digits. Where other noise levels take no pass it determines one, and rounds of one trial step follow, each with the noise
-/// estimated at its start. A step that lowers the sum of squares in units of that noise also lowers `sum N ln(sigma)`, the cost with the noise minimized out, because a
+/// The first determines three digits. Where other noise levels take no pass it determines one, and rounds of one trial step follow, each with the
+/// noise estimated at its start. A step that lowers the sum of squares in units of that noise also lowers `sum N ln(sigma)`, the cost with the noise minimized out, because a
 /// logarithm is concave. The last rounds go on until the noise has settled.
 pub(super) struct Rounds<'r> {
     plain: &'r Objective<'r>,
@@ -76,8 +87,8 @@ pub(super) struct Rounds<'r> {
     round: u32,
     /// How many more rounds of one trial step may follow.
     steps_left: u32,
-    /// Whether the present round is one.
-    is_single: bool,
+    /// What the present round is.
+    kind: Kind,
     /// Whether the triangles of each output are known where the present round begins, so that its first evaluation takes no pass.
     begins_known: bool,
     iterations: u64,
@@ -118,14 +129,14 @@ impl<'r> Rounds<'r> {
         Rounds {
             plain,
             optimizer: optimizer.clone(),
-            next: first.unwrap_or_else(|| optimizer.clone()),
+            next: first.clone().unwrap_or_else(|| optimizer.clone()),
             coordinates,
             whitening,
             memory,
             known: !noise::is_estimated(plain),
             round: 0,
             steps_left: if makes_steps(plain, optimizer) { SINGLE_STEPS } else { 0 },
-            is_single: false,
+            kind: if first.is_some() { Kind::Rough } else { Kind::Whole },
             begins_known: false,
             iterations: 0,
             left: optimizer.most(),
@@ -138,7 +149,7 @@ impl<'r> Rounds<'r> {
         loop {
             let objective = self.objective();
             // A checkpoint of a round of one step would be resumed with the limit of one step.
-            let own = file.as_ref().filter(|_| !self.is_single);
+            let own = file.as_ref().filter(|_| self.kind != Kind::Step);
             let result = self.next.round(&objective, self.coordinates.clone(), own);
             let result = match (result, self.stopped()) {
                 (Err(RoundError::Start(Infeasible::Cancelled)), Some(end)) => {
@@ -193,7 +204,7 @@ impl<'r> Rounds<'r> {
     /// Whether a round was a single trial step, and more are left of the limit.
     fn is_step(&self, round: &Round) -> bool {
         let limited = matches!(round.outcome, Outcome::IterationLimit { .. });
-        self.is_single && limited && round.iterations < self.left
+        self.kind == Kind::Step && limited && round.iterations < self.left
     }
 
     /// Records how a round with this objective [ended], and the noise there if it was asked for; returns the end of the search if
@@ -205,7 +216,7 @@ impl<'r> Rounds<'r> {
         noise: Option<Result<Whitening, Infeasible>>,
     ) -> Option<SearchEnd> {
         let is_step = self.is_step(&round);
-        // After a step that was rejected, a whole search adapts its damping; without triangles of each output, each step would take a pass more.
+        // After a step that was rejected, rounds of many steps adapt their damping; without triangles of each output, each round would take a pass more.
         let rejected = is_step && round.coordinates == self.coordinates;
         let knows_end = objective.memory.knows_outputs_at(&round.coordinates);
         if rejected || !knows_end {
@@ -229,7 +240,8 @@ impl<'r> Rounds<'r> {
         if let Some(found) = noise {
             let found = found.unwrap_or_else(|_| self.whitening.clone());
             let changes = found.sigma().into_iter().zip(self.whitening.sigma()).map(|(a, b)| (a / b).ln().abs());
-            settled = self.round > 1 && !is_step && changes.fold(0.0, f64::max) < NOISE_TOLERANCE;
+            settled =
+                self.round > 1 && !is_step && self.kind != Kind::Rough && changes.fold(0.0, f64::max) < NOISE_TOLERANCE;
             if !settled {
                 (self.whitening, linear) = (found, None);
             }
@@ -248,9 +260,12 @@ impl<'r> Rounds<'r> {
             }
             (outcome, _) => outcome,
         };
-        self.is_single = self.steps_left > 0;
+        (self.kind, self.next) = match self.steps_left {
+            _ if rejected => (Kind::Rough, self.optimizer.rough(ROUGH).limited(self.left)),
+            0 => (Kind::Whole, self.optimizer.limited(self.left)),
+            _ => (Kind::Step, self.optimizer.limited(self.left.min(1))),
+        };
         self.steps_left = self.steps_left.saturating_sub(1);
-        self.next = self.optimizer.limited(if self.is_single { self.left.min(1) } else { self.left });
         self.memory = objective.memory;
         let end = SearchEnd {
             coordinates: self.coordinates.clone(),
@@ -376,7 +391,7 @@ mod tests {
         (Whitening::none(1), Memory::default())
     }
 
-    /// The first of several rounds determines three digits. From a start that is right to three digits, the estimate equals that from a
+    /// The first of several rounds with a loss determines three digits. From a start that is right to three digits, the estimate equals that from a
     /// far start to ten times the tolerance of the noise.
     #[test]
     fn the_first_round_is_not_the_last() {

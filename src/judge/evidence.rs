@@ -84,10 +84,12 @@ impl<'e> Evidence<'e> {
         self.rows.get_or_init(|| rows(objective, &end.coordinates, self.asked()))
     }
 
-    /// Makes these passes of several estimates of one record each in parallel lanes.
+    /// Makes these passes of several estimates of one record each in parallel lanes, of those whose errors are no round-off.
     pub fn pass_together(all: &[&Self]) {
-        let points = all.iter().map(|one| ((one.point.objective, &one.point.end.coordinates[..]), one.asked()));
-        for (one, found) in all.iter().zip(rows_together(&points.collect::<Vec<_>>())) {
+        let asking = all.iter().filter(|one| !one.rounding).map(|one| (*one, one.asked()));
+        let (asking, asked): (Vec<&Self>, Vec<Asked<'_>>) = asking.filter(|(_, asked)| asked.is_some()).unzip();
+        let points = asking.iter().map(|one| (one.point.objective, &one.point.end.coordinates[..])).zip(asked);
+        for (one, found) in asking.iter().zip(rows_together(&points.collect::<Vec<_>>())) {
             found.into_iter().for_each(|found| _ = one.rows.set(found));
         }
     }

@@ -345,13 +345,11 @@ pub(super) struct Triangulation {
 }
 
 impl Triangulation {
-    /// Whether the correction changed more than this part of the squared errors of all outputs; where each has a triangle of its own, whether it changed
-    /// more than [`OF_ONE`] times this part of those of one.
+    /// Whether the correction changed more than this part of the squared errors of all outputs, or, where each has a triangle of its own, more than
+    /// [`OF_ONE`] times this part of those of one.
     fn is_coarse(&self, most: f64) -> bool {
-        match self.by_output.as_slice() {
-            [] => self.moved > most * 2.0 * self.cost,
-            outputs => outputs.iter().any(|[moved, squares]| *moved > OF_ONE * most * squares),
-        }
+        let of_one = |[moved, squares]: &[f64; 2]| *moved > OF_ONE * most * squares;
+        self.moved > most * 2.0 * self.cost || self.by_output.iter().any(of_one)
     }
 
     /// Joins the triangles of an experiment's segments, and returns the corrected borders.

@@ -56,7 +56,7 @@ pub(crate) trait AccumulateLanes {
     /// What one lane has summed up to.
     type Lane: Send;
 
-    /// Adds a window of standardized errors.
+    /// Adds a window of standardized errors. A lane without samples begins anywhere.
     fn add(&mut self, window: &Window);
 
     fn lane(&self, lane: usize) -> Self::Lane;

@@ -6,6 +6,7 @@ use super::linearize::parts_by_output;
 use super::pass::gather;
 use super::{Accumulate, AccumulateLanes, Objective, Values};
 use crate::optimize::{Infeasible, Linearization};
+use crate::sweep::RunError;
 
 /// An objective of one record, and a point.
 pub(crate) type At<'o> = (&'o Objective<'o>, &'o [f64]);
@@ -31,7 +32,8 @@ pub(crate) fn gather_together<A: Accumulate>(points: &[At<'_>], make: impl Fn(us
     found.into_iter().map(|found| found.map(|(one, ())| one)).collect()
 }
 
-/// The same, with an accumulator beside that takes all lanes together; it is made for the points of these.
+/// The accumulator of each, in a pass with these slopes, and one beside that takes all lanes together and is made for the points of these; `None` for a
+/// point that fails.
 pub(crate) fn gather_together_beside<A: Accumulate, L: AccumulateLanes>(
     points: &[At<'_>],
     slopes: Slopes,
@@ -57,7 +59,7 @@ pub(crate) enum Slopes {
     OfCoordinates,
 }
 
-/// Runs the records of all points; those that fail are left out, and the others run again without them.
+/// Runs the records of all points; those that fail are left out, and the others run again without them. Nothing where a stop condition holds.
 pub(super) fn together<T: Send>(
     points: &[At<'_>],
     slopes: Slopes,
@@ -81,6 +83,7 @@ pub(super) fn together<T: Send>(
         };
         match in_batches(&jobs, batch) {
             Ok(found) => return left.into_iter().zip(found).collect(),
+            Err((_, RunError::Stopped)) => return vec![],
             Err((job, _)) => left.remove(job),
         };
     }

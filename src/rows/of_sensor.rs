@@ -45,9 +45,10 @@ impl AccumulateLanes for SumOfSensor<'_> {
     fn add(&mut self, window: &Window) {
         let SumOfSensor { regressors, steps: Steps { output, kind, value, of: steps }, experiments, of } = self;
         regressors.take(window);
+        let mut run = vec![];
         for (lane, OfSensor { sums, errors }) in of.iter_mut().enumerate() {
             for (j, errors) in errors.iter_mut().enumerate() {
-                let mut run = vec![];
+                run.clear();
                 for k in 0..window.samples[lane] {
                     let (roots, slopes) = regressors.at(k * window.outputs() + j);
                     let root = roots[lane];

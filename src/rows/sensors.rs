@@ -27,15 +27,18 @@ pub(crate) struct Regressors<'o> {
     lanes: usize,
     /// Standard deviations of the outputs, lane by lane; ones in lanes without a record.
     sigma: Vec<f64>,
-    /// The prediction of each output in each lane at the sample before; NaN if it was not measured.
+    /// The prediction of each output in each lane at the sample before; NaN if it was not measured, and where a segment of a record begins, whether it is
+    /// cut there or not.
     before: Vec<f64>,
-    /// Row by row, these numbers one after the other, lane by lane.
+    /// Measurements of each row, lane by lane; NaN where there is none.
+    measured: Vec<f64>,
+    /// Row by row, root and slopes one after the other, lane by lane.
     rows: Vec<f64>,
 }
 
 impl<'o> Regressors<'o> {
     pub fn new(of: Vec<(&'o Objective<'o>, usize)>) -> Self {
-        Regressors { of, lanes: 0, sigma: vec![], before: vec![], rows: vec![] }
+        Regressors { of, lanes: 0, sigma: vec![], before: vec![], measured: vec![], rows: vec![] }
     }
 
     /// Whether the roots may be other numbers than one and zero.
@@ -60,24 +63,27 @@ impl<'o> Regressors<'o> {
         if self.before.is_empty() {
             self.begin(lanes, outputs);
         }
-        self.put_measurements(window);
-        let weighs = self.weighs();
+        self.read_measurements(window);
+        self.rows.resize(window.capacity() * outputs * (1 + KINDS) * lanes, 0.0);
+        let (weighs, begins) = (self.weighs(), self.begins(window));
         let mut units = vec![0.0; lanes];
-        let rows = self.rows.chunks_exact_mut((1 + KINDS) * lanes).enumerate();
-        for (k, output, row) in rows.map(|(number, row)| (number / outputs, number % outputs, row)) {
+        let rows = self.rows.chunks_exact_mut((1 + KINDS) * lanes).zip(self.measured.chunks_exact(lanes)).enumerate();
+        for (number, (row, measured)) in rows {
+            let (k, output) = (number / outputs, number % outputs);
             match window.has_variances() {
                 true => (0..lanes).for_each(|lane| units[lane] = window.variance_root(k, output, lane)),
                 false => units.copy_from_slice(&self.sigma[output * lanes..][..lanes]),
             }
             let errors = &window.row(k, output)[(window.columns() - 1) * lanes..];
             let before = &mut self.before[output * lanes..][..lanes];
+            begins.iter().filter(|(at, _)| *at == k).for_each(|(_, lane)| before[*lane] = f64::NAN);
             let (roots, slopes) = row.split_at_mut(lanes);
             let (gains, others) = slopes.split_at_mut(lanes);
             let (offsets, delays) = others.split_at_mut(lanes);
             for lane in 0..lanes {
-                let (measured, unit) = (gains[lane], units[lane]);
-                let prediction = measured - errors[lane] * unit;
-                let (change, present) = (before[lane] - prediction, !measured.is_nan());
+                let unit = units[lane];
+                let prediction = measured[lane] - errors[lane] * unit;
+                let (change, present) = (before[lane] - prediction, !prediction.is_nan());
                 before[lane] = prediction;
                 roots[lane] = if present { 1.0 } else { 0.0 };
                 let inverse = unit.recip();
@@ -98,19 +104,33 @@ impl<'o> Regressors<'o> {
         }
     }
 
-    /// Puts measurements in the places of the gains, NaN where there is none.
-    fn put_measurements(&mut self, window: &Window) {
-        let Regressors { of, rows, lanes, .. } = self;
-        let outputs = window.outputs();
-        rows.clear();
-        rows.resize(window.len() * outputs * (1 + KINDS) * *lanes, f64::NAN);
-        for (lane, (objective, experiment)) in of.iter().enumerate() {
+    /// The places in a window at which a later segment of a record begins, with their lanes.
+    fn begins(&self, window: &Window) -> Vec<(usize, usize)> {
+        let of = |(lane, (objective, experiment)): (usize, &(&Objective<'_>, usize))| {
+            let inside = window.begin[lane]..window.begin[lane] + window.samples[lane];
+            let segments = objective.problem.cuts.segments[*experiment].iter().skip(1).map(|segment| segment.start);
+            segments
+                .filter(|start| inside.contains(start))
+                .map(|start| (start - inside.start, lane))
+                .collect::<Vec<_>>()
+        };
+        self.of.iter().enumerate().flat_map(of).collect()
+    }
+
+    fn read_measurements(&mut self, window: &Window) {
+        let (lanes, outputs) = (window.lanes(), window.outputs());
+        self.measured.clear();
+        self.measured.resize(window.len() * outputs * lanes, f64::NAN);
+        // A lane that has ended begins behind its record.
+        let present = self.of.iter().enumerate().filter(|(lane, _)| window.samples[*lane] > 0);
+        for (lane, (objective, experiment)) in present {
             let samples = window.begin[lane]..window.begin[lane] + window.samples[lane];
             for (j, output) in objective.problem.records[*experiment].outputs().iter().enumerate() {
-                let first = (j * (1 + KINDS) + 1) * *lanes + lane;
-                let places = rows.iter_mut().skip(first).step_by(outputs * (1 + KINDS) * *lanes);
+                let places = self.measured.iter_mut().skip(j * lanes + lane).step_by(outputs * lanes);
                 for (k, (to, value)) in places.zip(&output.values[samples.clone()]).enumerate() {
-                    *to = if window.whole || window.is_measured(k, j, lane) { *value } else { f64::NAN };
+                    if window.whole || window.is_measured(k, j, lane) {
+                        *to = *value;
+                    }
                 }
             }
         }
@@ -127,16 +147,13 @@ impl<'o> Regressors<'o> {
 pub(crate) struct Extenders<'o> {
     regressors: Regressors<'o>,
     of: Vec<Triangles>,
-    /// How many rows each has, lane by lane.
-    counts: Vec<Vec<u64>>,
     rows: Aligned,
 }
 
 impl<'o> Extenders<'o> {
     /// Of the objective and the experiment in each lane.
     pub fn new(of: Vec<(&'o Objective<'o>, usize)>) -> Self {
-        let counts = vec![vec![0; of.len()]; of.first().map_or(0, |(objective, _)| objective.outputs())];
-        Extenders { regressors: Regressors::new(of), of: vec![], counts, rows: Aligned::zeros(0) }
+        Extenders { regressors: Regressors::new(of), of: vec![], rows: Aligned::zeros(0) }
     }
 }
 
@@ -144,7 +161,7 @@ impl AccumulateLanes for Extenders<'_> {
     type Lane = Vec<Information>;
 
     fn add(&mut self, window: &Window) {
-        let Extenders { regressors, of, counts, rows } = self;
+        let Extenders { regressors, of, rows } = self;
         let (lanes, outputs, columns) = (window.lanes(), window.outputs(), window.columns() + KINDS);
         regressors.take(window);
         let weighs = regressors.weighs();
@@ -152,7 +169,7 @@ impl AccumulateLanes for Extenders<'_> {
         if rows.is_empty() {
             *rows = Aligned::zeros(window.capacity() * columns * lanes);
         }
-        for (j, (triangles, counts)) in of.iter_mut().zip(counts).enumerate() {
+        for (j, triangles) in of.iter_mut().enumerate() {
             for (k, to) in rows.chunks_exact_mut(columns * lanes).enumerate().take(window.len()) {
                 let (roots, slopes) = regressors.at(k * outputs + j);
                 let (own, error) = window.row(k, j).split_at((window.columns() - 1) * lanes);
@@ -166,15 +183,13 @@ impl AccumulateLanes for Extenders<'_> {
                     let by_lane = to.chunks_exact_mut(lanes);
                     by_lane.for_each(|to| to.iter_mut().zip(roots).for_each(|(to, root)| *to *= root));
                 }
-                counts.iter_mut().zip(roots).for_each(|(count, root)| *count += u64::from(*root > 0.0));
             }
             triangles.absorb(rows, window.len());
         }
     }
 
     fn lane(&self, lane: usize) -> Vec<Information> {
-        let of = self.of.iter().zip(&self.counts);
-        of.map(|(triangles, counts)| triangles.triangle(lane).of_rows(counts[lane])).collect()
+        self.of.iter().map(|triangles| triangles.triangle(lane)).collect()
     }
 
     fn append(lane: &mut Vec<Information>, later: Vec<Information>) {
@@ -182,7 +197,7 @@ impl AccumulateLanes for Extenders<'_> {
     }
 }
 
-/// One triangle from those of each output, with the regressors of each in columns of their own.
+/// One triangle from those of each output, with the regressors of each in columns of their own. Its number of rows is not that of the measurements.
 pub(crate) fn of_all_outputs(of: Vec<Information>) -> Information {
     let outputs = of.len();
     let unknowns = of.first().map_or(0, |triangle| triangle.columns() - KINDS);
