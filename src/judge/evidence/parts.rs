@@ -64,7 +64,8 @@ pub(crate) struct Difference {
 pub(crate) fn parts(evidence: &Evidence<'_>) -> Vec<Parts> {
     let (point, outputs) = (&evidence.point, evidence.point.objective.outputs());
     let compared = evidence.ruled_out(UNLESS).is_none() && evidence.compare_parts();
-    let Some(all) = evidence.rows().spans.as_ref().filter(|_| compared) else { return vec![] };
+    let all = if compared { evidence.rows().spans.as_ref() } else { None };
+    let Some(all) = all else { return vec![] };
     let mut groups: Vec<(Into, Vec<Vec<Rows>>)> = vec![];
     if (2..=COMPARED).contains(&all.len()) {
         groups.push((Into::Records, vec![(0..all.len()).map(Rows::Record).collect()]));
