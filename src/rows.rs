@@ -28,8 +28,8 @@ pub(crate) struct Asked<'a> {
 }
 
 impl Asked<'_> {
-    pub fn is_some(&self) -> bool {
-        self.shares.is_some() || self.colored.is_some() || self.sensors || self.parts
+    pub fn is_empty(&self) -> bool {
+        self.shares.is_none() && self.colored.is_none() && !self.sensors && !self.parts
     }
 }
 
@@ -72,7 +72,7 @@ pub(crate) fn rows(objective: &Objective<'_>, coordinates: &[f64], asked: Asked<
     summing.with_frames(rows, sums)
 }
 
-/// The same of several objectives of one record each, in parallel lanes; `None` where the noise is correlated between outputs, or the pass fails.
+/// [`rows`] of several objectives of one record each, in parallel lanes; `None` where the noise is correlated between outputs, or the pass fails.
 pub(crate) fn rows_together(asked: &[(At<'_>, Asked<'_>)]) -> Vec<Option<Rows>> {
     let mut answers: Vec<Option<Rows>> = asked.iter().map(|_| None).collect();
     let independent = |number: &usize| matches!(asked[*number].0.0.whitening, Whitening::Diagonal(_));

@@ -84,10 +84,11 @@ impl<'e> Evidence<'e> {
         self.rows.get_or_init(|| rows(objective, &end.coordinates, self.asked()))
     }
 
-    /// Makes these passes of several estimates of one record each in parallel lanes, of those whose errors are no round-off.
+    /// Makes the passes of [`rows`](Self::rows) for several estimates of one record each, in parallel lanes. Errors that are round-off are left
+    /// out: few checks look at them, and these make the pass themselves.
     pub fn pass_together(all: &[&Self]) {
         let asking = all.iter().filter(|one| !one.rounding).map(|one| (*one, one.asked()));
-        let (asking, asked): (Vec<&Self>, Vec<Asked<'_>>) = asking.filter(|(_, asked)| asked.is_some()).unzip();
+        let (asking, asked): (Vec<&Self>, Vec<Asked<'_>>) = asking.filter(|(_, asked)| !asked.is_empty()).unzip();
         let points = asking.iter().map(|one| (one.point.objective, &one.point.end.coordinates[..])).zip(asked);
         for (one, found) in asking.iter().zip(rows_together(&points.collect::<Vec<_>>())) {
             found.into_iter().for_each(|found| _ = one.rows.set(found));

@@ -14,7 +14,7 @@ use std::sync::Arc;
 /// are.
 const MOVED: f64 = 0.1;
 /// That part at the first point, where no slopes exist to extrapolate borders from: slopes are then right to the root of it,
-/// 1e-3, which leaves the first step of a search as it is.
+/// 1e-3 (2e-3 for one output of several), which leaves the first step of a search as it is.
 const MOVED_FIRST: f64 = 1e-6;
 /// The correction for a nonlinear model is exact to the first order only. No further pass is made where it changes the squared
 /// errors by no more than this part of the difference from the best cost, which is what the search compares,

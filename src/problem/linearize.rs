@@ -26,7 +26,8 @@ pub(super) struct Part<T = Information> {
     pub reached: Reached,
 }
 
-/// By how much more, in parts, the correction of guessed borders may change the squared errors of one output than those of all.
+/// The part of one output's squared errors that the correction of guessed borders may change, relative to that part of all outputs'. It decides how
+/// exact the slopes are, not the errors: a part of 0.4 of one output of a motor, 0.07 of both, cost no step.
 const OF_ONE: f64 = 5.0;
 
 /// With a triangle for each output, or one for all of them.

@@ -51,12 +51,12 @@ impl<A: Accumulate> Accumulate for Vec<A> {
     }
 }
 
-/// An accumulator of the windows of segments that run in parallel lanes, all lanes together.
+/// An accumulator of the windows of segments that run in parallel lanes. It takes all lanes of a window at once, in vector registers.
 pub(crate) trait AccumulateLanes {
     /// What one lane has summed up to.
     type Lane: Send;
 
-    /// Adds a window of standardized errors. A lane without samples begins anywhere.
+    /// Adds a window of standardized errors. `begin` of a lane that has no samples may lie behind the end of its record.
     fn add(&mut self, window: &Window);
 
     fn lane(&self, lane: usize) -> Self::Lane;
@@ -65,7 +65,7 @@ pub(crate) trait AccumulateLanes {
     fn append(lane: &mut Self::Lane, later: Self::Lane);
 }
 
-/// None.
+/// Accumulates nothing.
 impl AccumulateLanes for () {
     type Lane = ();
 
@@ -76,7 +76,7 @@ impl AccumulateLanes for () {
     fn append(_lane: &mut (), _later: ()) {}
 }
 
-/// One that a pass may leave out, in all segments alike.
+/// An accumulator that a pass may leave out, in all segments alike.
 impl<L: AccumulateLanes> AccumulateLanes for Option<L> {
     type Lane = Option<L::Lane>;
 
@@ -137,7 +137,7 @@ impl Objective<'_> {
         Ok(found.into_iter().map(|(one, ())| one).collect())
     }
 
-    /// The same pass, with an accumulator beside that takes all lanes together; it is made for the experiments of these.
+    /// [`gather`](Self::gather) with a second accumulator, which `beside` makes for the experiments in the lanes of a batch.
     pub(crate) fn gather_beside<A: Accumulate, L: AccumulateLanes>(
         &self,
         coordinates: &[f64],

@@ -32,8 +32,7 @@ pub(crate) fn gather_together<A: Accumulate>(points: &[At<'_>], make: impl Fn(us
     found.into_iter().map(|found| found.map(|(one, ())| one)).collect()
 }
 
-/// The accumulator of each, in a pass with these slopes, and one beside that takes all lanes together and is made for the points of these; `None` for a
-/// point that fails.
+/// [`gather_together`] in a pass with these slopes, with a second accumulator, which `beside` makes for the points in the lanes of a batch.
 pub(crate) fn gather_together_beside<A: Accumulate, L: AccumulateLanes>(
     points: &[At<'_>],
     slopes: Slopes,
@@ -49,7 +48,7 @@ pub(crate) fn gather_together_beside<A: Accumulate, L: AccumulateLanes>(
     answers
 }
 
-/// With respect to what a pass has slopes.
+/// The variables with respect to which a pass computes slopes.
 #[derive(Clone, Copy, PartialEq)]
 pub(crate) enum Slopes {
     None,

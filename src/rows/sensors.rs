@@ -27,8 +27,8 @@ pub(crate) struct Regressors<'o> {
     lanes: usize,
     /// Standard deviations of the outputs, lane by lane; ones in lanes without a record.
     sigma: Vec<f64>,
-    /// The prediction of each output in each lane at the sample before; NaN if it was not measured, and where a segment of a record begins, whether it is
-    /// cut there or not.
+    /// The prediction of each output in each lane at the sample before. NaN if it was not measured, and at the begins of segments, also in a pass
+    /// that does not cut records: fleets then have the regressors of single fits.
     before: Vec<f64>,
     /// Measurements of each row, lane by lane; NaN where there is none.
     measured: Vec<f64>,
@@ -178,7 +178,7 @@ impl AccumulateLanes for Extenders<'_> {
                 to_own.copy_from_slice(own);
                 to_slopes.copy_from_slice(slopes);
                 to_error.copy_from_slice(error);
-                // All ones where a measurement is, and zeros elsewhere, where the row is zero too.
+                // Without weights and loss a root is one where something was measured; elsewhere the row is zero.
                 if weighs {
                     let by_lane = to.chunks_exact_mut(lanes);
                     by_lane.for_each(|to| to.iter_mut().zip(roots).for_each(|(to, root)| *to *= root));
