@@ -27,7 +27,7 @@ pub use plant::Plant;
 pub(crate) use plant::{Intervals, SlicePlant, Stepped, jacobian};
 pub use second_order::SecondOrder;
 pub use starting::Starting;
-pub(crate) use symbolic::{numbers, recurrence};
+pub(crate) use symbolic::{numbers, recurrence, settled};
 
 use crate::error::Error;
 use crate::graph::Symbol;

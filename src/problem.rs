@@ -17,6 +17,7 @@ mod linearize;
 pub(crate) mod noise;
 mod objective;
 mod pass;
+mod repeated;
 mod search;
 mod segments;
 mod settings;

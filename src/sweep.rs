@@ -48,12 +48,22 @@ pub struct Prepared {
     pub(crate) interleaved: Interleaved,
     /// The lengths of its intervals, where they are crossed exactly.
     pub(crate) lengths: Arc<OnceLock<Lengths>>,
+    /// The samples at which an output was not measured, where covariances may settle.
+    pub(crate) missing: Arc<OnceLock<Vec<usize>>>,
 }
 
 impl Prepared {
     /// The lengths of the intervals of its record.
     pub(crate) fn lengths(&self, record: &Record) -> &Lengths {
         self.lengths.get_or_init(|| Lengths::of(record))
+    }
+
+    /// Whether one of these samples of its record misses a measurement.
+    pub(crate) fn misses(&self, record: &Record, samples: Range<usize>) -> bool {
+        let is_missing = |k: &usize| record.outputs().iter().any(|output| output.values[*k].is_nan());
+        let missing = self.missing.get_or_init(|| (0..record.len()).filter(is_missing).collect());
+        let first = missing.partition_point(|sample| *sample < samples.start);
+        missing.get(first).is_some_and(|sample| *sample < samples.end)
     }
 }
 
@@ -254,6 +264,13 @@ pub trait Sweep: Send + Sync {
     fn measured_state(&self, record: &Record, sample: usize, parameters: &[f64]) -> Result<Vec<f64>, String> {
         let _ = (record, sample, parameters);
         Err("the sweep does not solve outputs for states".to_owned())
+    }
+
+    /// Of a filter, the covariance that it comes to around a sample, with its slopes: what is carried after the state. `None` where it does not come to an
+    /// end, and where the one in `carry` differs by more than this part.
+    fn settled(&self, piece: &Piece<'_>, seeds: &[Seed], sample: usize, carry: &[f64], part: f64) -> Option<Reached> {
+        let _ = (piece, seeds, sample, carry, part);
+        None
     }
 
     /// A start for the state at the first sample, from the first measurement of each output.

@@ -1,8 +1,10 @@
 //! [`Transition`]: a state with constant slopes over an interval, exactly.
 
 mod crossing;
+mod filter;
 
 pub(crate) use crossing::Crossing;
+pub(crate) use filter::{Filter, Sensor};
 
 use crate::scalar::Scalar;
 

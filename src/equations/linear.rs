@@ -5,8 +5,9 @@ use super::{Equations, Jacobian, evaluate};
 use crate::dual::Dual;
 use crate::graph::{Following, Graph, Id, Leaf, Node};
 use crate::layout::Kind;
+use crate::moments::entry;
 use crate::scalar::Scalar;
-use crate::transition::{Crossing, Transition, squares};
+use crate::transition::{Crossing, Filter, Sensor, Transition, squares};
 
 /// Slopes of a pass.
 const SLOPES: usize = 8;
@@ -20,6 +21,19 @@ pub(crate) struct Linear {
     states: usize,
     parameters: usize,
     entries: Vec<Entry>,
+    sensors: Option<Sensors>,
+}
+
+/// Measurements whose slopes and noises depend on parameters alone, as does what samples change of the state.
+#[derive(Clone, Debug)]
+struct Sensors {
+    output: Jacobian,
+    /// The levels of their noises.
+    noise: (Graph, Vec<Id>),
+    /// Of the state after a sample; empty where samples change nothing.
+    jump: Jacobian,
+    /// The parameters that the covariance of a filter depends on.
+    moves: Vec<u32>,
 }
 
 /// One of the matrices of a [`Crossing`].
@@ -79,9 +93,33 @@ impl Linear {
         let (states, parameters) = (layout.states.len(), layout.parameters.len());
         let a = Jacobian::of(graph, &roots.state, states);
         let diffusion = (!roots.diffusion.is_empty()).then(|| graph.pruned(&roots.diffusion));
-        let mut linear = Linear { a, diffusion, states, parameters, entries: vec![] };
+        let mut linear = Linear { a, diffusion, states, parameters, entries: vec![], sensors: None };
         linear.entries = linear.found();
+        linear.sensors = linear.sensors_of(equations);
         linear
+    }
+
+    fn sensors_of(&self, equations: &Equations) -> Option<Sensors> {
+        let Equations { layout, graph, roots } = equations;
+        let of = |roots: &[Id]| Jacobian::of(graph, roots, self.states);
+        let (output, jump, noise) = (of(&roots.output), of(&roots.jump), graph.pruned(&roots.noise));
+        let said = !layout.outputs.is_empty() && roots.noise.len() == layout.outputs.len();
+        let on_parameters = |graph: &Graph, roots: &[Id]| {
+            let nodes = graph.nodes().iter().zip(graph.reached(roots));
+            let leaf = |node: &Node| !matches!(node, Node::Leaf(leaf) if !matches!(leaf, Leaf::Parameter(_)));
+            nodes.filter(|(_, reached)| *reached).all(|(node, _)| leaf(node))
+        };
+        let constant = |of: &Jacobian| on_parameters(&of.graph, &of.entries);
+        if !said || !constant(&output) || !constant(&jump) || !on_parameters(&noise.0, &noise.1) {
+            return None;
+        }
+        let parts = [(&self.a.graph, &self.a.entries), (&output.graph, &output.entries), (&jump.graph, &jump.entries)];
+        let levels = self.diffusion.iter().chain([&noise]).map(|(graph, roots)| (graph, roots));
+        let each = |(graph, roots): (&Graph, &Vec<Id>)| {
+            roots.iter().filter_map(|root| moving(graph, *root, self.parameters)).collect::<Vec<_>>()
+        };
+        let all: Vec<Vec<bool>> = parts.into_iter().chain(levels).flat_map(each).collect();
+        Some(Sensors { output, noise, jump, moves: narrowed(&joined(self.parameters, all.iter())) })
     }
 
     /// The entries that are not always zero, with the parameters that move them.
@@ -124,10 +162,8 @@ impl Linear {
             }
         }
         let mut number = self.parameters;
-        let narrow = |i: usize| u32::try_from(i).unwrap_or(u32::MAX);
         let numbered = |(part, at, moves): (Part, usize, Vec<bool>)| {
-            let moves = moves.iter().enumerate().filter(|(_, moves)| **moves).map(|(j, _)| narrow(j)).collect();
-            let following = Following { number: narrow(number), moves };
+            let following = Following { number: narrow(number), moves: narrowed(&moves) };
             number = following.end();
             Entry { part, at, following }
         };
@@ -150,13 +186,63 @@ impl Linear {
         crossing
     }
 
+    /// How many numbers the parameters are with what follows from them.
+    fn end(&self) -> usize {
+        self.entries.last().map_or(self.parameters, |last| last.following.end())
+    }
+
+    /// Of a filter, the covariance before a sample that has settled, upper triangle row by row: after what follows from the parameters. `None` where slopes
+    /// or noises of outputs are not constant.
+    pub fn settling(&self) -> Option<Vec<Following>> {
+        let moves = &self.sensors.as_ref()?.moves;
+        let begin = |entry: usize| narrow(self.end() + entry * (1 + moves.len()));
+        let entries = 0..self.states * (self.states + 1) / 2;
+        Some(entries.map(|entry| Following { number: begin(entry), moves: moves.clone() }).collect())
+    }
+
+    /// The numbers of [`settling`](Self::settling), from those of an interval, where all outputs are measured at every sample and all intervals are alike, and
+    /// after them the variances of the outputs, of the same kind; `None` where the covariance does not settle.
+    pub fn settled(&self, numbers: &[f64]) -> Option<Vec<f64>> {
+        let (n, sensors) = (self.states, self.sensors.as_ref()?);
+        let (parameters, moves) = (&numbers[..self.parameters], &sensors.moves);
+        let plain = self.crossing(|following| numbers[following.number as usize]);
+        let value = sensors.filter(plain, parameters).settled()?;
+        let width = 1 + moves.len();
+        let entries = n * (n + 1) / 2;
+        let mut settled = vec![0.0; (entries + sensors.noise.1.len()) * width];
+        for pass in 0..moves.len().div_ceil(SLOPES).max(1) {
+            let here: Vec<u32> = moves.iter().skip(pass * SLOPES).take(SLOPES).copied().collect();
+            let mut p: Vec<Dual<SLOPES>> = parameters.iter().map(|p| Dual::from(*p)).collect();
+            for (lane, j) in here.iter().enumerate() {
+                p[*j as usize] = Dual::variable(parameters[*j as usize], lane);
+            }
+            let number = |following: &Following| {
+                let (first, mut number) = (following.number as usize, Dual::from(numbers[following.number as usize]));
+                for (slope, j) in number.slopes.iter_mut().zip(&here) {
+                    let at = following.moves.iter().position(|moves| moves == j);
+                    *slope = at.map_or(0.0, |at| numbers[first + 1 + at]);
+                }
+                number
+            };
+            let [covariance, variances] = sensors.filter(self.crossing(number), &p).about(&value);
+            let pairs = (0..n).flat_map(|i| (i..n).map(move |j| (entry(n, i, j), i * n + j)));
+            let found = pairs.map(|(entry, at)| (entry, covariance[at])).chain((entries..).zip(variances));
+            for (entry, found) in found {
+                let to = &mut settled[entry * width..][..width];
+                to[0] = found.value;
+                to[1 + pass * SLOPES..].iter_mut().zip(found.slopes).for_each(|(to, slope)| *to = slope);
+            }
+        }
+        settled.iter().all(|number| number.is_finite()).then_some(settled)
+    }
+
     /// The parameters, and after them what follows from them and the length of an interval (s), with its slopes.
     pub fn numbers(&self, parameters: &[f64], h: f64) -> Vec<f64> {
         let mut moving = vec![false; self.parameters];
         self.entries.iter().flat_map(|entry| &entry.following.moves).for_each(|j| moving[*j as usize] = true);
         let moving: Vec<usize> = (0..self.parameters).filter(|j| moving[*j]).collect();
         let mut numbers = parameters.to_vec();
-        numbers.resize(self.entries.last().map_or(self.parameters, |last| last.following.end()), 0.0);
+        numbers.resize(self.end(), 0.0);
         for pass in 0..moving.len().div_ceil(SLOPES).max(1) {
             let lane = |j: usize| {
                 moving.iter().position(|moves| *moves == j).map_or(SLOPES, |at| at.wrapping_sub(pass * SLOPES))
@@ -187,6 +273,17 @@ impl Linear {
     }
 }
 
+impl Sensors {
+    /// The filter by them over an interval.
+    fn filter<S: Scalar>(&self, crossing: Crossing<S>, p: &[S]) -> Filter<S> {
+        let at = |of: &Jacobian| evaluate(&of.graph, &of.entries, None, p);
+        let (slopes, levels) = (at(&self.output), evaluate(&self.noise.0, &self.noise.1, None, p));
+        let rows = slopes.chunks(crossing.n).zip(levels);
+        let sensors = rows.map(|(c, r)| Sensor { slopes: c.to_vec(), variance: r * r }).collect();
+        crossing.filter(&at(&self.jump), sensors)
+    }
+}
+
 /// The parameters that a root depends on; `None` of one that is zero.
 fn moving(graph: &Graph, root: Id, parameters: usize) -> Option<Vec<bool>> {
     if graph.known(root) == Some(0.0) {
@@ -201,6 +298,15 @@ fn moving(graph: &Graph, root: Id, parameters: usize) -> Option<Vec<bool>> {
         }
     }
     Some(moving)
+}
+
+fn narrow(i: usize) -> u32 {
+    u32::try_from(i).unwrap_or(u32::MAX)
+}
+
+/// The numbers of those that move.
+fn narrowed(moving: &[bool]) -> Vec<u32> {
+    moving.iter().enumerate().filter(|(_, moves)| **moves).map(|(j, _)| narrow(j)).collect()
 }
 
 fn joined<'m>(parameters: usize, all: impl Iterator<Item = &'m Vec<bool>>) -> Vec<bool> {

@@ -14,7 +14,8 @@ use serde::{Deserialize, Serialize};
 /// transition and covariance of an interval are computed once for each set of parameters and each length of the intervals, exactly, however stiff the model and
 /// long the interval (C. F. Van Loan, IEEE Transactions on Automatic Control 23 (1978) 395-404). Lengths that differ by rounding, by a part of 1e-9, are one;
 /// for a clock that jitters, whose lengths are many and close to each other, the transition is interpolated by a polynomial through twelve lengths, of
-/// which `e^{Ah}` and the covariance are checked to 1e-11. For models that are not affine it is the extended filter: they
+/// which `e^{Ah}` and the covariance are checked to 1e-11. A covariance that has settled, to a part of 1e-10, is computed no more while all outputs are
+/// measured at intervals of one length, if their slopes and noises follow from parameters alone: it is that of the algebraic Riccati equation. For models that are not affine it is the extended filter: they
 /// follow the model and its slopes to the first order (A. H. Jazwinski, *Stochastic Processes and Filtering Theory*, 1970, section 9.3),
 ///
 /// ```text

@@ -4,7 +4,7 @@ use super::plant::identity;
 use super::{Moments, Plant, Prediction, StartsFrom};
 use crate::equations::{AllMoments, Equations, Jacobian, MomentsOf, Slopes};
 use crate::functions::Functions;
-use crate::graph::{Graph, Id, Leaf, Node, Symbol, Untraceable};
+use crate::graph::{Following, Graph, Id, Leaf, Node, Symbol, Untraceable};
 use crate::integrate::{Method, Stuck};
 use crate::layout::{Kind, Layout};
 use crate::record::Holds;
@@ -22,28 +22,71 @@ pub(crate) fn recurrence(
     predictor: &dyn Prediction,
     holds: &Holds,
 ) -> Result<Recurrence, Untraceable> {
+    let linear = method.is_exact().then(|| equations.linear()).flatten();
+    let following = linear.map_or(vec![], |linear| linear.following());
+    let made = carrying(equations, method, predictor, holds, &[])?;
+    let started = started(equations, predictor);
+    Ok(made.started(started).with_following(following))
+}
+
+/// The recurrence of a filter of linear equations whose covariance has settled: the state alone is carried, and the entries of the covariance follow from the
+/// parameters, as do the variances of the outputs. `None` where covariances do not settle whatever the parameters.
+pub(crate) fn settled(
+    equations: &Equations,
+    method: &dyn Method,
+    predictor: &dyn Prediction,
+    holds: &Holds,
+) -> Option<(Recurrence, Vec<Following>)> {
+    let linear = method.is_exact().then(|| equations.linear()).flatten().filter(|_| predictor.is_filter())?;
+    let covariance = linear.settling()?;
+    let made = carrying(equations, method, predictor, holds, &covariance).ok()?;
     let layout = equations.layout();
-    let (carried, outputs) = (predictor.carry(layout), layout.outputs.len());
+    // It goes on from a state that depends on all that there is.
+    let states = (0..layout.states.len()).map(|i| Leaf::State(narrow(i)));
+    let state = states.chain((0..layout.parameters.len()).map(|j| Leaf::Parameter(narrow(j)))).collect();
+    let started = Started { states: layout.states.len(), state, rest: vec![] };
+    let following = [linear.following(), covariance.clone()].concat();
+    Some((made.started(started).with_following(following), covariance))
+}
+
+fn narrow(i: usize) -> u32 {
+    u32::try_from(i).unwrap_or(u32::MAX)
+}
+
+/// A recurrence in which the last entries of what a predictor carries are not carried, but follow from the parameters.
+fn carrying(
+    equations: &Equations,
+    method: &dyn Method,
+    predictor: &dyn Prediction,
+    holds: &Holds,
+    settled: &[Following],
+) -> Result<Recurrence, Untraceable> {
+    let layout = equations.layout();
+    let (carried, outputs) = (predictor.carry(layout) - settled.len(), layout.outputs.len());
     let slopes = predictor.needs_slopes().then(|| Slopes::of(equations));
     let moments = OnceCell::new();
     let numbers = numbers(equations, predictor).len();
-    let number = |i: usize| u32::try_from(i).unwrap_or(u32::MAX);
     let mut graph = Graph::default();
     let roots = graph.trace(|| {
         let plant = SymbolicPlant {
             interval: SymbolicInterval::new(equations, method, holds),
             slopes: slopes.as_ref(),
             moments: &moments,
-            p: (0..layout.parameters.len() + numbers).map(|j| Symbol::leaf(Leaf::Parameter(number(j)))).collect(),
+            p: (0..layout.parameters.len() + numbers).map(|j| Symbol::leaf(Leaf::Parameter(narrow(j)))).collect(),
         };
         let steps = predictor.symbols();
-        let mut carry: Vec<Symbol> = (0..carried).map(|i| Symbol::leaf(Leaf::State(number(i)))).collect();
+        let states = (0..carried).map(|i| Leaf::State(narrow(i)));
+        let known = settled.iter().map(|following| Leaf::Parameter(following.number));
+        let mut carry: Vec<Symbol> = states.chain(known).map(Symbol::leaf).collect();
         let (mut means, mut variances) = (vec![], vec![]);
         for j in 0..outputs {
             let (mean, variance) = steps.predict(&plant, &carry, j);
-            let y = Symbol::leaf(Leaf::Measured(number(j)));
-            // A missing measurement is NaN, and equals nothing.
-            let if_measured = |then: Symbol, or: Symbol| Symbol::select(Comparison::Equal, y, y, then, or);
+            let y = Symbol::leaf(Leaf::Measured(narrow(j)));
+            // A missing measurement is NaN, and equals nothing. A covariance settles where none is missing.
+            let if_measured = |then: Symbol, or: Symbol| match settled {
+                [] => Symbol::select(Comparison::Equal, y, y, then, or),
+                _ => then,
+            };
             let error = if_measured(y - mean, Symbol::from(0.0));
             let mut corrected = carry.clone();
             steps.correct(&plant, &mut corrected, j, error);
@@ -54,15 +97,15 @@ pub(crate) fn recurrence(
         if steps.advance(&plant, &mut carry).is_err() {
             Symbol::fail("its predictor cannot go on to the next sample");
         }
-        [carry, means, if predictor.predicts_variance() { variances } else { vec![] }].concat()
+        carry.truncate(carried);
+        // Of a settled filter they are known beside the program.
+        let predicted = predictor.predicts_variance() && settled.is_empty();
+        [carry, means, if predicted { variances } else { vec![] }].concat()
     })?;
     let (next, rest) = roots.split_at(carried.min(roots.len()));
     let (mean, variance) = rest.split_at(outputs.min(rest.len()));
     let made = Recurrence::from_roots(&graph, next, mean, variance);
-    let made = made.map_err(|wrong| Untraceable { reason: wrong.to_string() })?;
-    let linear = method.is_exact().then(|| equations.linear()).flatten();
-    let following = linear.map_or(vec![], |linear| linear.following());
-    Ok(made.started(started(equations, slopes.as_ref(), predictor)).with_following(following))
+    made.map_err(|wrong| Untraceable { reason: wrong.to_string() })
 }
 
 /// The numbers that follow the parameters in a program; none where those of dead times do, then they are constants.
@@ -71,11 +114,10 @@ pub(crate) fn numbers(equations: &Equations, predictor: &dyn Prediction) -> Vec<
 }
 
 /// The states and parameters on which the start depends.
-fn started(equations: &Equations, slopes: Option<&Slopes>, predictor: &dyn Prediction) -> Started {
+fn started(equations: &Equations, predictor: &dyn Prediction) -> Started {
     let (layout, roots) = (equations.layout(), equations.roots());
-    let number = |i: usize| u32::try_from(i).unwrap_or(u32::MAX);
-    let states = (0..layout.states.len()).map(|i| Leaf::State(number(i)));
-    let all: Vec<Leaf> = states.chain((0..layout.parameters.len()).map(|j| Leaf::Parameter(number(j)))).collect();
+    let states = (0..layout.states.len()).map(|i| Leaf::State(narrow(i)));
+    let all: Vec<Leaf> = states.chain((0..layout.parameters.len()).map(|j| Leaf::Parameter(narrow(j)))).collect();
     let of = |graph: &Graph, roots: &[Id]| -> Vec<Leaf> {
         let nodes = graph.nodes().iter().zip(graph.reached(roots));
         let leaf = |(node, reached): (&Node, bool)| match node {
@@ -84,9 +126,10 @@ fn started(equations: &Equations, slopes: Option<&Slopes>, predictor: &dyn Predi
         };
         nodes.filter_map(leaf).collect()
     };
-    let rest = match (predictor.starts_from(), slopes) {
-        (StartsFrom::InitialNoise, _) => of(equations.graph(), &roots.initial_noise),
-        (StartsFrom::Slopes, Some(Slopes { state, jump, .. })) => {
+    let rest = match predictor.starts_from() {
+        StartsFrom::InitialNoise => of(equations.graph(), &roots.initial_noise),
+        StartsFrom::Slopes if predictor.needs_slopes() => {
+            let Slopes { state, jump, .. } = Slopes::of(equations);
             // Inputs may be late.
             let levels = of(equations.graph(), &[&*roots.diffusion, &roots.delay].concat());
             [levels, of(&state.graph, &state.entries), of(&jump.graph, &jump.entries)].concat()

@@ -3,6 +3,7 @@
 use super::Weighing;
 use super::job::Job;
 use super::likelihood::Likelihood;
+use super::repeated::joined;
 use crate::information::{Block, Information, Triangles};
 use crate::sweep::Window;
 use crate::wide::{self, Task, Wide, Width};
@@ -48,11 +49,12 @@ impl<'o> Absorber<'o> {
     /// Absorbs a window; its contents are overwritten.
     pub fn absorb(&mut self, window: &mut Window) {
         let count = window.len() * window.outputs();
+        let (lanes, width, columns) = (window.lanes(), window.width, window.columns());
         if self.plain {
             self.count(window);
             if window.has_variances() {
-                self.sums.resize(window.lanes(), 0.0);
-                let (width, columns, sums) = (window.width, window.columns(), &mut self.sums[..]);
+                self.sums.resize(lanes, 0.0);
+                let sums = &mut self.sums[..];
                 let (rows, variances) = window.rows_and_variances_mut();
                 wide::run(width, Likelihood { rows, variances, columns, sums });
             } else if window.lanes() > 1 {
@@ -62,9 +64,11 @@ impl<'o> Absorber<'o> {
             self.weigh(window, &mut []);
         }
         if window.has_variances() {
-            self.absorb_rows(window.lanes(), window.width, window.variance_rows_mut(), count);
+            let samples = if self.plain && window.settled != 0 { joined(window) } else { window.len() };
+            let count = samples * window.outputs();
+            self.absorb_rows(lanes, width, &mut window.variance_rows_mut()[..count * columns * lanes], count);
         }
-        self.absorb_rows(window.lanes(), window.width, window.rows_mut(), count);
+        self.absorb_rows(lanes, width, window.rows_mut(), count);
     }
 
     /// Absorbs a window in which `replace` overwrites the errors; it is given the numbers `beside`, one for each error, row by row and lane by lane. Rows and
@@ -123,6 +127,7 @@ impl<'o> Absorber<'o> {
     fn weigh(&mut self, window: &mut Window, beside: &mut [f64]) {
         let (lanes, last) = (window.lanes(), window.columns() - 1);
         let outputs = window.outputs();
+        window.spread();
         for (k, j) in (0..window.len()).flat_map(|k| (0..outputs).map(move |j| (k, j))) {
             for (lane, weighing) in self.weighing.iter_mut().enumerate() {
                 if !window.is_measured(k, j, lane) {

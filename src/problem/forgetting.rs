@@ -20,6 +20,9 @@ const SAME: f64 = 1e-11;
 /// Slopes are the same where none differs by more than this part of the largest one of its column: gradients are as near.
 const SAME_SLOPES: f64 = 1e-9;
 
+/// A guess of a covariance is replaced by the one that it comes to where they differ by no more than this part: a step of a search moves it by less.
+const NEAR: f64 = 0.1;
+
 /// A record in segments.
 struct Segmented<'p> {
     whole: Job<'p>,
@@ -164,6 +167,28 @@ impl Objective<'_> {
     /// Guesses of the carries at the begins of run-ins: those of the best point before, moved along their slopes; at the first point simulated, with
     /// slopes of zero.
     fn before_run_ins(
+        &self,
+        coordinates: &[f64],
+        values: &[Values],
+        part: usize,
+        chains: &[Segmented<'_>],
+    ) -> Result<Vec<Vec<Reached>>, RunError> {
+        let mut guesses = self.guessed_before_run_ins(coordinates, values, part, chains)?;
+        for (chain, guesses) in chains.iter().zip(&mut guesses) {
+            let Job { seeds, piece, .. } = &chain.whole;
+            let begins = chain.run_ins.iter().zip(guesses);
+            for (sample, guess) in begins {
+                if let Some(settled) = self.sweep.settled(piece, seeds, *sample, &guess.carry, NEAR) {
+                    let (states, all) = (guess.carry.len() - settled.carry.len(), seeds.len());
+                    guess.carry[states..].copy_from_slice(&settled.carry);
+                    guess.slopes[states * all..].copy_from_slice(&settled.slopes);
+                }
+            }
+        }
+        Ok(guesses)
+    }
+
+    fn guessed_before_run_ins(
         &self,
         coordinates: &[f64],
         values: &[Values],

@@ -9,7 +9,7 @@ const ROWS: usize = 8;
 const SAFE: f64 = 1e-37;
 
 /// For standardized errors `z` and their predicted variances `v`, zero where nothing was measured: adds `z^2 + ln v` to the sum of each lane, and
-/// writes `(z^2 - 1) / sqrt(2)`, the error of the variance's row, over `v`.
+/// writes `(z^2 - 1) / sqrt(2)`, the error of the variance's row, over `v`. Where variances repeat themselves there is a row for each output, which is left as it is.
 pub(super) struct Likelihood<'l> {
     pub rows: &'l [f64],
     pub variances: &'l mut [f64],
@@ -26,12 +26,15 @@ impl Task for Likelihood<'_> {
         let lanes = sums.len();
         let (width, last) = (columns * lanes, (columns - 1) * lanes);
         let (zero, one) = (W::splat(0.0), W::splat(1.0));
-        for (rows, variances) in rows.chunks(ROWS * width).zip(variances.chunks_mut(ROWS * width)) {
+        let (all, there) = (rows.len(), variances.len());
+        let variance_of = |at: usize| if there == all { at } else { at % there };
+        for begin in (0..all).step_by(ROWS * width) {
+            let end = all.min(begin + ROWS * width);
             for first in (0..lanes - lanes % W::LANES).step_by(W::LANES) {
-                let places = (last + first..rows.len()).step_by(width);
+                let places = (begin + last + first..end).step_by(width);
                 let (mut sum, mut product, mut least, mut largest) = (zero, one, one, one);
                 for at in places.clone() {
-                    let (z, v) = (W::load(&rows[at..]), W::load(&variances[at..]));
+                    let (z, v) = (W::load(&rows[at..]), W::load(&variances[variance_of(at)..]));
                     let measured = v.select_eq(zero, one, v);
                     (sum, product) = (z.mul_add(z, sum), product.mul(measured));
                     least = measured.select_lt(least, measured, least);
@@ -41,23 +44,25 @@ impl Task for Likelihood<'_> {
                     sum = sum.add(product.map(f64::ln));
                 } else {
                     for at in places.clone() {
-                        let v = W::load(&variances[at..]);
+                        let v = W::load(&variances[variance_of(at)..]);
                         sum = sum.add(v.select_eq(zero, one, v).map(f64::ln));
                     }
                 }
                 W::load(&sums[first..]).add(sum).store(&mut sums[first..]);
-                for at in places {
+                for at in places.filter(|_| there == all) {
                     let (z, v) = (W::load(&rows[at..]), W::load(&variances[at..]));
                     let error = z.mul(z).sub(one).mul(W::splat(FRAC_1_SQRT_2));
                     v.select_eq(zero, zero, error).store(&mut variances[at..]);
                 }
             }
             for (lane, sum) in sums.iter_mut().enumerate().skip(lanes - lanes % W::LANES) {
-                for at in (last + lane..rows.len()).step_by(width) {
-                    let (square, v) = (rows[at] * rows[at], variances[at]);
+                for at in (begin + last + lane..end).step_by(width) {
+                    let (square, v) = (rows[at] * rows[at], variances[variance_of(at)]);
                     if v != 0.0 {
                         *sum += square + v.ln();
-                        variances[at] = (square - 1.0) * FRAC_1_SQRT_2;
+                        if there == all {
+                            variances[at] = (square - 1.0) * FRAC_1_SQRT_2;
+                        }
                     }
                 }
             }

@@ -192,7 +192,10 @@ impl Objective<'_> {
         guess: Option<&Borders>,
     ) -> Result<Triangulation, Infeasible> {
         let cuts = &self.problem.cuts;
-        let chained = |e: usize| cuts.is_chained(e).then(|| Chained::new(self.job(e, &values[e], coordinates, true)));
+        let chained = |e: usize| {
+            cuts.is_chained(e)
+                .then(|| Chained::new(self.job(e, &values[e], coordinates, true), &cuts.segments[e], guess))
+        };
         let chained: Vec<Option<Chained<'_>>> = (0..self.experiments()).map(chained).collect();
         let mut jobs: Vec<Job<'_>> = Vec::with_capacity(cuts.segments.iter().map(Vec::len).sum());
         for (e, chained) in chained.iter().enumerate() {
@@ -288,6 +291,18 @@ pub(super) fn parts_by_output(jobs: &[&Job<'_>], sets: usize) -> Result<Vec<Part
     Ok(reached.into_iter().enumerate().map(part).collect())
 }
 
+impl Job<'_> {
+    /// The slopes of the covariance of a filter that has settled at all begins of segments but the first one.
+    fn settled(&self, segments: &[Range<usize>], borders: Option<&Borders>, seeds: &[Seed]) -> Option<Vec<f64>> {
+        let at = |s: usize| {
+            let carry = &borders?.at(self.experiment, s)?.carry;
+            self.objective.sweep.settled(&self.piece, seeds, segments[s].start, carry, 0.0)
+        };
+        let first = at(1)?;
+        (2..segments.len()).all(|s| at(s).as_ref() == Some(&first)).then_some(first.slopes)
+    }
+}
+
 /// A record cut into segments, each of which is run with slopes with respect to its initial carry and the parameters.
 struct Chained<'p> {
     whole: Job<'p>,
@@ -296,18 +311,31 @@ struct Chained<'p> {
     parameters: Vec<usize>,
     /// Slopes of the initial carry with respect to `seeds`: ones for each entry with respect to itself, else zeros.
     slopes: Vec<f64>,
+    /// How many entries of the carry are seeds: all, but for the covariance of a filter that has settled at all borders.
+    carried: usize,
 }
 
 impl<'p> Chained<'p> {
-    fn new(whole: Job<'p>) -> Self {
-        let carried = whole.piece.carry.len();
+    fn new(whole: Job<'p>, segments: &[Range<usize>], guess: Option<&Borders>) -> Self {
         let is_parameter = |i: &usize| matches!(whole.seeds[*i], Seed::Parameter(_));
         let parameters: Vec<usize> = (0..whole.seeds.len()).filter(is_parameter).collect();
-        let seeds: Vec<Seed> =
-            (0..carried).map(Seed::Carry).chain(parameters.iter().map(|&i| whole.seeds[i])).collect();
-        let mut slopes = vec![0.0; carried * seeds.len()];
-        slopes.iter_mut().step_by(seeds.len() + 1).for_each(|slope| *slope = 1.0);
-        Chained { whole, seeds: seeds.into(), parameters, slopes }
+        let seeds = |carried: usize| -> Vec<Seed> {
+            (0..carried).map(Seed::Carry).chain(parameters.iter().map(|&i| whole.seeds[i])).collect()
+        };
+        let ones = |carried: usize, columns: usize| {
+            let mut slopes = vec![0.0; carried * columns];
+            slopes.iter_mut().step_by(columns + 1).for_each(|slope| *slope = 1.0);
+            slopes
+        };
+        let (all, states) = (whole.piece.carry.len(), whole.objective.sweep.layout().states.len());
+        let of_states = seeds(states);
+        if let Some(covariance) = whole.settled(segments, guess.filter(|guess| guess.right), &of_states) {
+            let slopes = [ones(states, of_states.len()), covariance].concat();
+            return Chained { whole, seeds: of_states.into(), parameters, slopes, carried: states };
+        }
+        let seeds = seeds(all);
+        let slopes = ones(all, seeds.len());
+        Chained { whole, seeds: seeds.into(), parameters, slopes, carried: all }
     }
 
     fn jobs<'s>(&'s self, segments: &'s [Range<usize>], guess: Option<&'s Borders>) -> impl Iterator<Item = Job<'s>> {
@@ -320,7 +348,12 @@ impl<'p> Chained<'p> {
                 let rows = slopes.to_mut().chunks_exact_mut(self.seeds.len());
                 let given = |of: &[f64]| of.iter().all(|slope| *slope == 0.0);
                 for (i, row) in rows.enumerate() {
-                    if given(&whole.slopes[i * unknowns.len()..][..unknowns.len()]) {
+                    let own = &whole.slopes[i * unknowns.len()..][..unknowns.len()];
+                    if i >= self.carried {
+                        // An entry that is no seed has the slopes of the begin of the record.
+                        let of_parameters = row[self.carried..].iter_mut().zip(&self.parameters);
+                        of_parameters.for_each(|(slope, unknown)| *slope = own[*unknown]);
+                    } else if given(own) {
                         row.fill(0.0);
                     }
                 }
@@ -362,9 +395,10 @@ impl Triangulation {
         guess: Option<&Borders>,
         affine: bool,
     ) -> Vec<Reached> {
-        let Job { experiment, scales, piece: Piece { carry, slopes, .. }, .. } = of.whole;
-        let carried = carry.len();
-        let chain = || Chain::new(carried, segments, slopes.to_vec(), &of.parameters, &scales);
+        let Job { experiment, scales, piece: Piece { slopes, .. }, .. } = of.whole;
+        let (carried, seeds) = (of.carried, of.seeds.len());
+        let begin = || slopes[..carried * scales.len()].to_vec();
+        let chain = || Chain::new(carried, segments, begin(), &of.parameters, &scales);
         let mut chains: Vec<Chain<'_>> = (0..sets).map(|_| chain()).collect();
         let right = guess.is_some_and(|guess| guess.right && !affine);
         let mut corrected = vec![];
@@ -373,15 +407,18 @@ impl Triangulation {
             simulated += part.cost;
             chains.iter_mut().zip(&part.triangle).for_each(|(chain, triangle)| chain.add(triangle));
             if let Some(Reached { carry, .. }) = guess.and_then(|guess| guess.at(experiment, s + 1)) {
+                let Reached { carry: end, slopes: of_end } = &part.reached;
                 for chain in &mut chains {
-                    chain.go_on(&part.reached.carry, &part.reached.slopes, carry);
+                    chain.go_on(&end[..carried], &of_end[..carried * seeds], &carry[..carried]);
                     if right {
                         chain.without_defect();
                     }
                 }
                 let Some((defect, slopes)) = chains.first().map(Chain::begin) else { continue };
-                let carry = carry.iter().zip(defect).map(|(carry, defect)| carry + defect).collect();
-                corrected.push(Reached { carry, slopes: slopes.to_vec() });
+                let (mut carry, mut slopes) = (carry.clone(), slopes.to_vec());
+                carry.iter_mut().zip(defect).for_each(|(carry, defect)| *carry += defect);
+                slopes.resize(carry.len() * scales.len(), 0.0);
+                corrected.push(Reached { carry, slopes });
             }
         }
         for ([moved, squares], chain) in self.by_output.iter_mut().zip(&chains) {

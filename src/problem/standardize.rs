@@ -122,7 +122,10 @@ impl Task for Multiply<'_> {
 /// `dv / (sqrt(2) v)`, so that with `(z^2 - 1) / sqrt(2)` beside them the least-squares gradient is that of the likelihood.
 fn by_variance(window: &mut Window) -> Result<(), (usize, usize)> {
     let (lanes, columns, outputs) = (window.lanes(), window.columns(), window.outputs());
-    for (k, j) in (0..window.len()).flat_map(|k| (0..outputs).map(move |j| (k, j))) {
+    let width = window.width;
+    let positive = window.whole && wide::run(width, Positive { variances: window.variance_rows_mut(), columns, lanes });
+    let samples = if positive { 0 } else { window.len() };
+    for (k, j) in (0..samples).flat_map(|k| (0..outputs).map(move |j| (k, j))) {
         let measured = window.measured(k, j);
         let variances = window.variance_row(k, j)[(columns - 1) * lanes..].iter().enumerate();
         let wrong = |(lane, v): &(usize, &f64)| !(**v > 0.0 && v.is_finite()) && measured >> lane & 1 == 1;
@@ -130,10 +133,35 @@ fn by_variance(window: &mut Window) -> Result<(), (usize, usize)> {
             return Err((lane, window.begin[lane] + k));
         }
     }
-    let width = window.width;
     let (rows, variances) = window.rows_and_variances_mut();
     wide::run(width, ByVariance { rows, variances, columns, lanes });
     Ok(())
+}
+
+/// Whether all variances are positive and finite; lanes that fill no register are not looked at, and it is not said of them.
+struct Positive<'v> {
+    variances: &'v [f64],
+    columns: usize,
+    lanes: usize,
+}
+
+impl Task for Positive<'_> {
+    type Output = bool;
+
+    #[inline(always)]
+    fn run<W: Wide>(self) -> bool {
+        let Positive { variances, columns, lanes } = self;
+        let (mut least, mut differences) = (W::splat(1.0), W::splat(0.0));
+        for row in variances.chunks_exact(columns * lanes) {
+            for v in row[(columns - 1) * lanes..].chunks_exact(W::LANES) {
+                let v = W::load(v);
+                least = v.select_lt(least, v, least);
+                differences = differences.add(v.sub(v));
+            }
+        }
+        // A difference of what is not finite is not a number.
+        lanes % W::LANES == 0 && differences.all_below(1.0) && W::splat(0.0).sub(least).all_below(0.0)
+    }
 }
 
 /// Divides errors and their slopes by `sqrt(v)`, and slopes of variances by `sqrt(2) v`. Where nothing was measured all of them are zero, `v` too, and
@@ -153,13 +181,18 @@ impl Task for ByVariance<'_> {
         let ByVariance { rows, variances, columns, lanes } = self;
         let (width, last) = (columns * lanes, (columns - 1) * lanes);
         let (zero, one) = (W::splat(0.0), W::splat(1.0));
-        for (row, second) in rows.chunks_exact_mut(width).zip(variances.chunks_exact_mut(width)) {
+        // A variance's row is that of an error, or where variances repeat themselves that of an output.
+        let apart = variances.len();
+        for (number, second) in variances.chunks_exact_mut(width).enumerate() {
+            let begins = (number * width..rows.len()).step_by(apart);
             for first in (0..lanes - lanes % W::LANES).step_by(W::LANES) {
                 let v = W::load(&second[last + first..]);
                 let v = v.select_eq(zero, one, v);
                 let (root, half) = (one.div(v.sqrt()), W::splat(FRAC_1_SQRT_2).div(v));
-                for at in (first..width).step_by(lanes) {
-                    W::load(&row[at..]).mul(root).store(&mut row[at..]);
+                for row in begins.clone() {
+                    for at in (row + first..row + width).step_by(lanes) {
+                        W::load(&rows[at..]).mul(root).store(&mut rows[at..]);
+                    }
                 }
                 for at in (first..last).step_by(lanes) {
                     W::load(&second[at..]).mul(half).store(&mut second[at..]);
@@ -168,7 +201,9 @@ impl Task for ByVariance<'_> {
             for lane in lanes - lanes % W::LANES..lanes {
                 let v = if second[last + lane] == 0.0 { 1.0 } else { second[last + lane] };
                 let (root, half) = (1.0 / v.sqrt(), FRAC_1_SQRT_2 / v);
-                row[lane..].iter_mut().step_by(lanes).for_each(|entry| *entry *= root);
+                for row in begins.clone() {
+                    rows[row + lane..row + width].iter_mut().step_by(lanes).for_each(|entry| *entry *= root);
+                }
                 second[lane..last].iter_mut().step_by(lanes).for_each(|entry| *entry *= half);
             }
         }

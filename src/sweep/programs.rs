@@ -9,6 +9,7 @@ mod interleaved;
 mod key;
 mod late;
 mod run;
+mod settling;
 mod workspace;
 
 use super::made::{of_equations, of_equations_in_duals};
@@ -20,15 +21,16 @@ use crate::graph::Untraceable;
 use crate::integrate::{Method, stepped};
 use crate::interval::Hold;
 use crate::layout::{Kind, Layout};
-use crate::predict::{FreeRun, GivenNoise, Guess, Prediction, numbers, recurrence};
+use crate::predict::{FreeRun, GivenNoise, Guess, Prediction, numbers, recurrence, settled};
 use crate::record::{Holds, Initial, Record, Time};
 use crate::recurrence::Recurrence;
-use crossed::Crossed;
+use crossed::{Crossed, Crossing};
 pub(crate) use derived::Derived;
 pub(crate) use interleaved::Interleaved;
 use key::{Key, Purpose};
 use late::Late;
 use run::Run;
+use settling::Settling;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use workspace::Compiled;
 
@@ -147,6 +149,18 @@ impl Programs {
         Ok(made)
     }
 
+    /// Filters of such records after their covariances have settled, if they may.
+    fn settling(&self, Key { holds, sampling, seeds, purpose, .. }: &Key) -> Option<Settling> {
+        self.crossed.as_ref()?;
+        let (recurrence, covariance) = settled(&self.equations, &*self.method, &*self.predictor, holds)?;
+        match purpose {
+            Purpose::Rows => Settling::new(recurrence, covariance, seeds, *sampling, Trajectories::Many),
+            Purpose::Carry => {
+                Settling::new(recurrence.without_outputs(), covariance, &[], *sampling, Trajectories::One)
+            }
+        }
+    }
+
     /// The program for records like this one; `None` where there can be none.
     fn program(&self, record: &Record, seeds: &[Seed], purpose: Purpose) -> Option<Arc<Compiled>> {
         let sampling = match record.times() {
@@ -174,7 +188,8 @@ impl Programs {
         };
         let program = program.and_then(|program| program.map_err(|too_large| too_large.to_string()));
         let late = is_late.then(|| Late::new(self.equations.clone()));
-        let program = program.map(|program| Arc::new(Compiled::new(program, late, self.crossed.clone())));
+        let settling = self.settling(&key);
+        let program = program.map(|program| Arc::new(Compiled::new(program, late, self.crossed.clone(), settling)));
         compiled.push((key, program.clone()));
         program.ok()
     }
@@ -257,6 +272,13 @@ impl Sweep for ProgramSweep<'_> {
             }
             None => self.plain.follow(piece, at),
         }
+    }
+
+    fn settled(&self, piece: &Piece<'_>, seeds: &[Seed], sample: usize, carry: &[f64], part: f64) -> Option<Reached> {
+        let compiled = self.programs.program(piece.record, seeds, Purpose::Rows)?;
+        let length = piece.prepared.lengths(piece.record).after(sample);
+        let numbers = Crossing::new(compiled.crossed.as_ref()?, &[piece]).settled(0, length)?;
+        compiled.settling.as_ref()?.covariance(numbers, carry, part)
     }
 
     fn states(

@@ -26,6 +26,10 @@ pub struct Window {
     pub carry: Vec<f64>,
     /// Whether it is known that every lane with a piece has as many samples, all measured, and all errors are finite.
     pub(crate) whole: bool,
+    /// Lanes whose variances and their slopes are the same at all samples, a bit each.
+    pub(crate) settled: u32,
+    /// Whether they are so in all lanes, which have as many samples, and stand in the rows of the first sample only.
+    repeated: bool,
     /// The registers that its lanes are made for.
     pub(crate) width: Width,
 }
@@ -47,6 +51,8 @@ impl Window {
             measured: vec![0; capacity * outputs],
             carry: vec![],
             whole: false,
+            settled: 0,
+            repeated: false,
             width: Width::widest(),
         }
     }
@@ -56,6 +62,7 @@ impl Window {
         self.begin.fill(0);
         self.samples.fill(0);
         self.whole = false;
+        (self.settled, self.repeated) = (0, false);
     }
 
     /// Numbers in each entry, one per lane.
@@ -101,16 +108,42 @@ impl Window {
         &mut self.values[..used]
     }
 
-    /// The rows of the variances.
+    /// The rows of the variances that there are: those of each sample, or of the first where they repeat themselves.
     pub fn variance_rows_mut(&mut self) -> &mut [f64] {
-        let used = self.len() * self.outputs * self.columns * self.lanes;
-        &mut self.variances[..used]
+        self.rows_and_variances_mut().1
     }
 
-    /// Rows and those of the variances.
+    /// Rows and those of the variances that there are.
     pub(crate) fn rows_and_variances_mut(&mut self) -> (&mut [f64], &mut [f64]) {
-        let used = self.len() * self.outputs * self.columns * self.lanes;
-        (&mut self.values[..used], &mut self.variances[..used])
+        let sample = self.outputs * self.columns * self.lanes;
+        let (used, samples) = (self.len() * sample, if self.repeated { 1 } else { self.len() });
+        (&mut self.values[..used], &mut self.variances[..samples * sample])
+    }
+
+    /// Whether the rows of the variances of the first sample are those of all.
+    pub(crate) fn is_repeated(&self) -> bool {
+        self.repeated
+    }
+
+    /// Says whether the rows of the variances of the first sample are those of all.
+    pub(crate) fn repeat(&mut self, repeated: bool) {
+        self.repeated = repeated;
+    }
+
+    /// Gives each sample rows of the variances of its own.
+    pub(crate) fn spread(&mut self) {
+        if self.repeated {
+            let sample = self.outputs * self.columns * self.lanes;
+            (1..self.len()).for_each(|k| self.variances.copy_within(..sample, k * sample));
+            self.repeated = false;
+        }
+    }
+
+    /// Where the row of an output's variance begins.
+    #[inline(always)]
+    fn variance_begin(&self, sample: usize, output: usize) -> usize {
+        let sample = if self.repeated { 0 } else { sample };
+        (sample * self.outputs + output) * self.columns * self.lanes
     }
 
     /// The rows of a window of one lane, and whether each holds a measurement.
@@ -140,14 +173,13 @@ impl Window {
 
     /// The row of an output's variance.
     pub fn variance_row(&self, sample: usize, output: usize) -> &[f64] {
-        let width = self.columns * self.lanes;
-        &self.variances[(sample * self.outputs + output) * width..][..width]
+        &self.variances[self.variance_begin(sample, output)..][..self.columns * self.lanes]
     }
 
     /// The row of an output's variance, to be written.
     pub fn variance_row_mut(&mut self, sample: usize, output: usize) -> &mut [f64] {
-        let width = self.columns * self.lanes;
-        &mut self.variances[(sample * self.outputs + output) * width..][..width]
+        let begin = self.variance_begin(sample, output);
+        &mut self.variances[begin..][..self.columns * self.lanes]
     }
 
     /// Whether variances are predicted.
@@ -163,7 +195,7 @@ impl Window {
 
     /// One number of the row of an output's variance.
     pub(crate) fn variance_at(&self, sample: usize, output: usize, column: usize, lane: usize) -> f64 {
-        self.variances[((sample * self.outputs + output) * self.columns + column) * self.lanes + lane]
+        self.variances[self.variance_begin(sample, output) + column * self.lanes + lane]
     }
 
     /// The prediction error.
@@ -183,7 +215,7 @@ impl Window {
     /// The predicted variance; one where none is predicted.
     #[inline(always)]
     pub fn variance(&self, sample: usize, output: usize, lane: usize) -> f64 {
-        let at = ((sample * self.outputs + output + 1) * self.columns - 1) * self.lanes + lane;
+        let at = self.variance_begin(sample, output) + (self.columns - 1) * self.lanes + lane;
         self.variances.get(at).copied().unwrap_or(1.0)
     }
 

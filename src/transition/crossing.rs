@@ -1,5 +1,6 @@
 //! [`Crossing`]: the state and its covariance at the end of an interval.
 
+use super::{Filter, Sensor, product};
 use crate::moments::entry;
 use crate::scalar::Scalar;
 
@@ -58,6 +59,19 @@ impl<S: Scalar> Crossing<S> {
                 covariance[entry(n, i, j)] = sum.unwrap_or_else(|| S::from(0.0));
             }
         }
+    }
+}
+
+impl<S: Scalar> Crossing<S> {
+    /// The filter of the state by these measurements at the begin of each interval, after which samples change it by the slopes `jump`, if they do.
+    pub fn filter(self, jump: &[S], sensors: Vec<Sensor<S>>) -> Filter<S> {
+        let n = self.n;
+        let all = |entries: Vec<Option<S>>| {
+            entries.into_iter().map(|entry| entry.unwrap_or_else(|| S::from(0.0))).collect::<Vec<S>>()
+        };
+        let (kept, upper) = (all(self.kept), all(self.covariance));
+        let added = (0..n * n).map(|at| upper[(at / n).min(at % n) * n + (at / n).max(at % n)]).collect();
+        Filter { n, kept: if jump.is_empty() { kept } else { product(n, &kept, jump) }, added, sensors }
     }
 }
 

@@ -5,7 +5,7 @@ use crate::common::Noise;
 use argmin::core::{CostFunction, Gradient};
 use core::f64::consts::TAU;
 use greybox::estimate::{CovarianceMethod, NoiseModel};
-use greybox::optimize::JacobianColumns;
+use greybox::optimize::{JacobianColumns, LeastSquares};
 use greybox::optimize::{LevenbergMarquardt, Stop};
 use greybox::*;
 use nalgebra::{DMatrix, DVector};
@@ -616,5 +616,62 @@ fn noise_levels_under_a_robust_loss() {
     for (found, truth) in [(fit.parameters.y, truth.y), (fit.parameters.z, truth.z)] {
         // Four deviations.
         assert!((found / truth - 1.0).abs() < 0.05, "{found} for {truth}: {fit}");
+    }
+}
+
+/// Records of all measurements, long enough that covariances come to an end: in segments of one record, by run-ins where the filter's memory is short (some two
+/// samples), chained where it is longer (ten), and where it is so long (twenty) that the first segment ends before; and of eight records side by side. In some of them
+/// one measurement is missing. Cost and gradient against the filter of each sample.
+#[test]
+fn covariances_that_settle() {
+    let (tau, step) = (0.4, 0.02);
+    for (drift, records, missing) in [(5.0, 1, 1), (0.1, 1, 0), (0.1, 1, 1), (0.02, 1, 0), (5.0, 8, 1), (0.1, 8, 1)] {
+        let samples = 6_000 / records;
+        let mut noise = Noise(17);
+        let a = f64::exp(-step / tau);
+        let spread = drift * f64::sqrt(tau / 2.0 * (1.0 - a * a));
+        let one = |record: usize| {
+            let (mut x, mut inputs, mut outputs) = (1.5, vec![], vec![]);
+            for k in 0..samples {
+                let u = if (k + 7 * record) % 170 < 80 { 1.0 } else { -0.5 };
+                let (y, z) = (x + 0.3 * noise.gauss(), 2.0 * x + 0.5 * noise.gauss());
+                outputs.push(Sensors { y: if missing == 1 && k == 2 * samples / 3 { f64::NAN } else { y }, z });
+                inputs.push(Push { u });
+                x = a * x + (1.0 - a) * 2.0 * u + spread * noise.gauss();
+            }
+            let time = Time::Uniform { start: 0.0, step };
+            Experiment::new(&Lag, time, inputs, outputs).unwrap().initial(Position { x: fixed(1.4) })
+        };
+        let all: Vec<ExperimentOf<Lag>> = (0..records).map(one).collect();
+        let parameters = Dynamics { tau: free(0.5).log(), drift: free(0.8 * drift).log(), ..dynamics() };
+        let problem = Fit::new(&Lag, &all).parameters(parameters).predictor(Kalman).problem().unwrap();
+        let objective = problem.objective().unwrap();
+        let sum = |p: &[f64]| {
+            let p: Vec<D> = p.iter().enumerate().map(|(j, p)| Dual::variable(*p, j)).collect();
+            let (tau, gain, drift) = (p[0].exp(), p[1], p[2].exp());
+            let a = (-tau.recip() * step).exp();
+            let of = |record: &ExperimentOf<Lag>| {
+                let q = drift * drift * tau * (-(a * a) + 1.0) * 0.5;
+                let steps = record.inputs().take(record.len() - 1).map(|u| [a, gain * (-a + 1.0) * u.u, q]).collect();
+                let measurements = measurements(record.outputs(), [1.0, 2.0], [p[3].exp(), p[4]]);
+                Chain { start: D::from(1.4), steps, measurements }.by_filter()
+            };
+            all.iter().map(of).sum::<D>()
+        };
+        let constant = 0.5 * (records * (2 * samples - missing)) as f64 * TAU.ln();
+        for change in [0.0, 1e-3, -0.05] {
+            let at: Vec<f64> = objective.start().iter().map(|x| x * (1.0 + change)).collect();
+            let exact = sum(&at);
+            let found = objective.linearize(&at).unwrap();
+            let in_values = objective.cost(&at).unwrap();
+            // A covariance is taken for settled within 1e-10, which one sample in a thousand is off by.
+            for cost in [found.cost, in_values] {
+                assert!(((cost + constant) / exact.value - 1.0).abs() < 1e-12, "{} {}", cost + constant, exact.value);
+            }
+            // Terms of either sign: measured by their number.
+            for (found, exact) in objective.gradient(&at).unwrap().iter().zip(exact.slopes) {
+                assert!((found - exact).abs() < 1e-10 * constant, "{drift} {records} {change}: {found} {exact}");
+            }
+        }
     }
 }

@@ -28,7 +28,7 @@ pub(super) struct Crossed {
 }
 
 /// Parameters, and what follows from them and the length of an interval.
-type Numbers = Arc<Vec<f64>>;
+pub(super) type Numbers = Arc<Vec<f64>>;
 
 /// The numbers of a set of parameters.
 #[derive(Default)]
@@ -36,6 +36,8 @@ struct Known {
     parameters: Vec<f64>,
     /// By the bits of the length of an interval (s), and whether they are those of a polynomial.
     numbers: Mutex<FxHashMap<(u64, bool), Numbers>>,
+    /// By the bits of the length of the intervals: with the covariance that a filter comes to, if it does.
+    settled: Mutex<FxHashMap<u64, Option<Numbers>>>,
     /// By their number; none where a polynomial is no good.
     bands: Mutex<FxHashMap<i32, Option<Arc<Band>>>>,
 }
@@ -76,6 +78,18 @@ impl Crossed {
             kept.insert(key, numbers.clone());
         }
         numbers
+    }
+
+    /// The parameters, what follows from them and the length of an interval, and the covariance that a filter comes to.
+    fn settled(&self, known: &Known, lengths: &Lengths, length: f64) -> Option<Numbers> {
+        if let Some(settled) = lock(&known.settled).get(&length.to_bits()) {
+            return settled.clone();
+        }
+        let numbers = self.numbers(known, lengths, length);
+        let covariance = (length > 0.0).then(|| self.linear.settled(&numbers)).flatten();
+        let settled = covariance.map(|covariance| Arc::new([&numbers[..], &covariance].concat()));
+        lock(&known.settled).insert(length.to_bits(), settled.clone());
+        settled
     }
 
     fn band(&self, known: &Known, number: i32) -> Option<Arc<Band>> {
@@ -137,6 +151,12 @@ impl<'r> Crossing<'r> {
         if changed {
             group.prepare();
         }
+    }
+
+    /// The numbers of a lane whose covariance has settled, if it does with intervals of this length.
+    pub fn settled(&self, lane: usize, length: f64) -> Option<Numbers> {
+        let Lane { known, lengths, .. } = &self.lanes[lane];
+        self.crossed.settled(known, lengths, length)
     }
 
     /// At which offsets into `counted`, a range of samples after the first of each lane's piece, the length of the interval changes in a lane.

@@ -3,6 +3,7 @@
 use super::columns::Columns;
 use super::crossed::Crossing;
 use super::interleaved::Kept;
+use super::settling::{BLOCK, Lanes};
 use super::workspace::{Compiled, WINDOW, Workspace};
 use crate::record::Time;
 use crate::sweep::{Piece, Reached, RunError, Visit, Window};
@@ -19,6 +20,8 @@ pub(super) struct Run<'r> {
     kept: Option<Arc<Kept>>,
     /// Where linear equations are crossed exactly.
     crossing: Option<Crossing<'r>>,
+    /// Where covariances may settle.
+    settling: Option<Lanes<'r>>,
     space: Workspace,
 }
 
@@ -39,7 +42,9 @@ impl<'r> Run<'r> {
             }
         }
         group.prepare();
-        let mut run = Run { compiled, pieces, columns: None, kept: None, crossing, space };
+        let settling = compiled.settling.as_ref();
+        let settling = settling.map(|settling| Lanes::new(settling, &compiled.program, pieces.len()));
+        let mut run = Run { compiled, pieces, columns: None, kept: None, crossing, settling, space };
         run.start();
         run
     }
@@ -50,6 +55,7 @@ impl<'r> Run<'r> {
             let piece = self.pieces.get(lane).unwrap_or(&self.pieces[0]);
             self.space.group.resume(lane, &piece.carry, &piece.slopes);
         }
+        self.settling.iter_mut().for_each(Lanes::restart);
     }
 
     /// Starts again with other pieces, as many as before, of the same records with the same parameters.
@@ -80,24 +86,46 @@ impl<'r> Run<'r> {
             window.samples[lane] = all.len().saturating_sub(begin).min(WINDOW);
         }
         group.carries(&mut window.carry);
+        if let Some(settling) = &self.settling {
+            settling.carries(&mut window.carry, group.lanes());
+        }
+        window.repeat(false);
+        window.settled = if self.settling.is_some() { u32::MAX >> (32 - self.pieces.len()) } else { 0 };
         self.fill(begin, samples, reached);
     }
 
     /// Predicts the samples `begin..end` of the window that begins `first` samples after the first of each piece.
     fn predict(&mut self, first: usize, begin: usize, end: usize) {
+        let samples = end - begin;
         let Workspace { group, inputs, rows, window, .. } = &mut self.space;
         let program = &self.compiled.program;
         if let Some(crossing) = &mut self.crossing {
             crossing.enter(group, &self.pieces, first + begin);
         }
+        let [settled, active] = match (&mut self.settling, &self.crossing) {
+            (Some(settling), Some(crossing)) => settling.enter(group, crossing, &self.pieces, first + begin, samples),
+            _ => [0, u32::MAX],
+        };
+        window.settled &= settled | !active;
+        let whole = settled == active && self.pieces.len() == active.count_ones() as usize;
+        let whole = whole && window.samples[..self.pieces.len()].iter().all(|here| *here == samples);
         let (inputs, read): (&[f64], usize) =
             self.kept.as_ref().map_or((inputs, begin), |kept| (&kept.inputs, first + begin));
+        if let Some(settling) = self.settling.as_mut().filter(|_| whole) {
+            let inputs = &inputs[read * program.columns().len() * group.lanes()..];
+            return settling.run_all(inputs, window, samples);
+        }
         let rows = if window.has_variances() { rows } else { window.all_rows_mut() };
         let (inputs_at, rows_at) = (program.columns().len() * group.lanes(), program.row_length() * group.lanes());
         let (inputs, rows) = (&inputs[read * inputs_at..], &mut rows[begin * rows_at..]);
-        match begin {
-            0 => group.run(inputs, rows, end - begin),
-            _ => group.go_on(inputs, rows, end - begin),
+        if settled != active {
+            match begin {
+                0 => group.run(inputs, rows, samples),
+                _ => group.go_on(inputs, rows, samples),
+            }
+        }
+        if let Some(settling) = self.settling.as_mut().filter(|_| settled != 0) {
+            settling.run(inputs, rows, samples, settled);
         }
     }
 
@@ -146,8 +174,7 @@ impl<'r> Run<'r> {
                 }
                 sample += samples;
             }
-            let mut carry = vec![0.0; self.compiled.program.carried()];
-            self.space.group.carry(0, &mut carry);
+            let carry = self.reached(0).carry;
             if carry.iter().any(|x| !x.is_finite()) {
                 return Err(RunError::Failed { sample: next });
             }
@@ -158,6 +185,9 @@ impl<'r> Run<'r> {
     }
 
     fn reached(&self, lane: usize) -> Reached {
+        if let Some(reached) = self.settling.as_ref().and_then(|settling| settling.settled(lane)) {
+            return reached;
+        }
         let program = &self.compiled.program;
         let (carried, seeds) = (program.carried(), program.seeds().len());
         let mut reached = Reached { carry: vec![0.0; carried], slopes: vec![0.0; carried * seeds] };
@@ -166,8 +196,8 @@ impl<'r> Run<'r> {
         reached
     }
 
-    /// Where a window is cut, `begin` samples after the first of each piece, in ascending order: where a piece ends that is continued by another, and
-    /// where the length of an interval changes that is crossed exactly.
+    /// Where a window is cut, `begin` samples after the first of each piece, in ascending order: where a piece ends that is continued by another,
+    /// where the length of an interval changes that is crossed exactly, and where covariances may have settled.
     fn cuts(&self, begin: usize, samples: usize) -> Vec<usize> {
         let continued = |(piece, here): &(&Piece<'_>, &usize)| {
             (1..samples).contains(*here) && piece.samples.end < piece.record.len()
@@ -175,7 +205,11 @@ impl<'r> Run<'r> {
         let ends = self.pieces.iter().zip(&self.space.window.samples).filter(continued).map(|(_, here)| *here);
         let changes = |crossing: &Crossing<'_>| crossing.changes(&self.pieces, begin..begin + samples);
         let changes = self.crossing.as_ref().map_or(vec![], changes);
-        let mut cuts: Vec<usize> = ends.chain(changes).collect();
+        let blocks = match &self.settling {
+            Some(settling) if !settling.stays(&self.pieces, begin, samples) => BLOCK,
+            _ => samples,
+        };
+        let mut cuts: Vec<usize> = ends.chain(changes).chain((blocks..samples).step_by(blocks)).collect();
         cuts.sort_unstable();
         cuts.dedup();
         cuts
@@ -196,7 +230,7 @@ impl<'r> Run<'r> {
         let Workspace { group, measured, rows, begins, window, .. } = &mut self.space;
         let (lanes, outputs, columns) = (group.lanes(), window.outputs(), window.columns());
         let width = columns * lanes;
-        if window.has_variances() {
+        if window.has_variances() && !window.is_repeated() {
             for (k, rows) in rows.chunks_exact(2 * outputs * width).take(samples).enumerate() {
                 for (j, row) in rows.chunks_exact(width).enumerate() {
                     match j.checked_sub(outputs) {

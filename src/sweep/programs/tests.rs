@@ -1,5 +1,6 @@
 mod crossed;
 mod late;
+mod settling;
 
 use super::*;
 use crate::functions::Handle;

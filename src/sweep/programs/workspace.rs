@@ -3,6 +3,7 @@
 use super::crossed::Crossed;
 use super::interleaved::Idle;
 use super::late::Late;
+use super::settling::Settling;
 use crate::aligned::Aligned;
 use crate::engine::{Group, Program};
 use crate::sweep::Window;
@@ -19,6 +20,8 @@ pub(super) struct Compiled {
     pub late: Option<Late>,
     /// Where linear equations are crossed exactly.
     pub crossed: Option<Arc<Crossed>>,
+    /// Where the covariance of a filter may settle.
+    pub settling: Option<Settling>,
     idle: Mutex<Vec<Workspace>>,
     pub columns: Arc<Idle>,
 }
@@ -38,8 +41,13 @@ pub(super) struct Workspace {
 }
 
 impl Compiled {
-    pub fn new(program: Program, late: Option<Late>, crossed: Option<Arc<Crossed>>) -> Self {
-        Compiled { program, late, crossed, idle: Mutex::new(vec![]), columns: Arc::default() }
+    pub fn new(
+        program: Program,
+        late: Option<Late>,
+        crossed: Option<Arc<Crossed>>,
+        settling: Option<Settling>,
+    ) -> Self {
+        Compiled { program, late, crossed, settling, idle: Mutex::new(vec![]), columns: Arc::default() }
     }
 
     /// Memory for a run of so many pieces. Lanes, steps and samples are to be set.
