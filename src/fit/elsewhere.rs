@@ -26,7 +26,7 @@ const LONGEST_IN_LANES: usize = 20_000;
 const LONGEST: usize = 2_000;
 
 /// Deviances that differ by less belong to one minimum: a move by a tenth of a standard error changes the deviance by 0.1^2.
-const SAME: f64 = 0.01;
+pub(super) const SAME: f64 = 0.01;
 
 /// The most trial steps of each further search, at least one, and whether the user's limit makes them fewer.
 #[derive(Clone, Copy)]
@@ -120,7 +120,7 @@ impl Further {
 }
 
 /// An estimate as if it had taken the work of another.
-fn work_of(of: &Summary, found: Summary) -> Summary {
+pub(super) fn work_of(of: &Summary, found: Summary) -> Summary {
     Summary { iterations: of.iterations, evaluations: of.evaluations, seconds: of.seconds, ..found }
 }
 

@@ -154,7 +154,9 @@ pub(super) fn fit_together(problems: &[Problem<'_>]) -> Vec<Result<Summary, Erro
         each(problems.len(), |i| problems[i].first_start(&control)).into_iter().unzip();
     let leds: Vec<Option<Led>> = starts.iter().map(|start: &Start| start.stages.clone()).collect();
     let all: Vec<From<'_>> = problems.iter().zip(starts).collect();
-    let found = by_one_method(&all, &control).into_iter().zip(notes);
+    let found = by_one_method(&all, &control);
+    let shot = each(found.len(), |i| problems[i].shot_further(found[i].as_ref().ok()?, leds[i].as_ref(), &control));
+    let found = found.into_iter().zip(shot).map(|(found, shot)| shot.map_or(found, Ok)).zip(notes);
     let found: Vec<_> = found.map(|(found, note)| found.map(|found| noted(found, note))).collect();
     let further = each(found.len(), |i| problems[i].search_further(found[i].as_ref().ok()?, &control));
     let found = found.into_iter().zip(&further);

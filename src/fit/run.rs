@@ -57,7 +57,9 @@ impl Problem<'_> {
     fn run_first(&self, begin: Instant, control: &Control) -> (Result<Summary, Error>, Option<Led>) {
         let (start, note) = self.first_start(control);
         let led = start.stages.clone();
-        (self.run_from(start, begin, control).map(|found| noted(found, note)), led)
+        let found = self.run_from(start, begin, control);
+        let found = found.map(|found| self.shot_further(&found, led.as_ref(), control).unwrap_or(found));
+        (found.map(|found| noted(found, note)), led)
     }
 
     fn run_from(&self, start: Start, begin: Instant, control: &Control) -> Result<Summary, Error> {

@@ -46,6 +46,11 @@ impl Shot {
     pub fn explains(&self) -> bool {
         self.gap <= CLOSED && self.misfit <= EXPLAINS
     }
+
+    /// Whether it came to nothing: gaps stayed open, or the errors are far from the noise.
+    pub fn is_lost(&self) -> bool {
+        self.gap > CLOSED || self.misfit > NEAR
+    }
 }
 
 impl fmt::Display for Shot {

@@ -1,11 +1,11 @@
-//! Fits that go in stages: asked for, or because their start cannot be simulated.
+//! Fits that go in stages: asked for, or because their start cannot be simulated or leads to nothing.
 
-use super::elsewhere::leaves_unexplained;
+use super::elsewhere::{SAME, leaves_unexplained, work_of};
 use super::refine::{Start, is_only_coarse};
 use super::stages::Led;
 use crate::error::Error;
 use crate::estimate::{About, Summary, Warning, WarningCode};
-use crate::optimize::{Infeasible, LeastSquares};
+use crate::optimize::{Infeasible, LeastSquares, Outcome};
 use crate::problem::{Control, Lead, Problem, SearchPlan, Settings};
 use crate::severity::Severity;
 use std::time::Instant;
@@ -72,12 +72,50 @@ impl Problem<'_> {
         let leading = Problem { settings: Settings { lead: Lead::Stages, ..settings.clone() }, ..self.clone() };
         let (start, led) = leading.stages().ok()?.declared(control).ok()?;
         let problem = Problem { settings, ..self.clone() };
-        let mut found = problem.run_within(begin, control, start).ok()?;
+        let found = problem.run_within(begin, control, start).ok()?;
+        let mut found = problem.shot_further(&found, Some(&led), control).unwrap_or(found);
         if is_only_coarse(&found) {
             found = problem.refined(Ok(found), 0, begin, control).ok()?;
         }
         Some((found, led))
     }
+
+    /// The estimate after multiple shooting from where a search from the end of stages is stuck, with the work of all: the cost of a chaotic plant is
+    /// rough, that of pieces is not. `None` where there is no such end; the estimate as it was where the new one is higher.
+    pub(super) fn shot_further(&self, found: &Summary, led: Option<&Led>, control: &Control) -> Option<Summary> {
+        let trials = self.settings.optimizer.most().saturating_sub(found.iterations);
+        let is_new = led.is_some_and(|led| led.stages > 0 && led.shot.is_none());
+        if !is_new || !is_stuck(found.outcome) || trials == 0 || control.stops() {
+            return None;
+        }
+        let begin = Instant::now();
+        // A checkpoint is that of the search before.
+        let problem = Problem { settings: Settings { checkpoint: None, ..self.settings.clone() }, ..self.clone() };
+        let shot = problem.stages().ok()?.shot(&found.coordinates(), control).ok()?;
+        let start = Start { coordinates: shot.coordinates.clone(), trials, ..Start::declared(&problem) };
+        let again = problem.run_within(begin, control, start).ok()?;
+        let work = Summary {
+            iterations: found.iterations + again.iterations,
+            evaluations: found.evaluations + shot.evaluations + again.evaluations,
+            seconds: found.seconds + begin.elapsed().as_secs_f64(),
+            ..found.clone()
+        };
+        if !again.deviance.zip(found.deviance).is_some_and(|(again, found)| again <= found + SAME) {
+            return Some(work);
+        }
+        let text =
+            format!("the search from the end of the stages was stuck, so that one from the end of {shot} followed");
+        Some(noted(work_of(&work, again), Some(note(text))))
+    }
+}
+
+/// Whether a search ended by itself and not at a minimum: no limit ended it.
+fn is_stuck(outcome: Outcome) -> bool {
+    let stuck = matches!(
+        outcome,
+        Outcome::Stalled { .. } | Outcome::Creeping { .. } | Outcome::Rough { .. } | Outcome::LimitOfPrecision { .. }
+    );
+    stuck && !outcome.converged()
 }
 
 /// An estimate with one more note, if there is one.

@@ -148,13 +148,7 @@ impl Stages<'_> {
         let mut memory = (FIRST_MEMORY / self.movement.rate).max(least);
         let follows = |memory: f64| {
             let problem = self.problem(memory)?;
-            let errors = errors(&problem, start, control)?;
-            Some(
-                errors
-                    .iter()
-                    .zip(&self.movement.outputs)
-                    .all(|(e, moves)| *e <= NEAR * moves.noise || moves.half == 0.0),
-            )
+            Some(self.are_within(&errors(&problem, start, control)?, |moves| NEAR * moves.noise))
         };
         while memory > least && follows(memory) != Some(true) && !control.stops() {
             memory = (memory / LONGER).max(least);
@@ -175,17 +169,11 @@ impl Stages<'_> {
         if nearer.is_some() && led.follows || control.stops() {
             return nearer.map(|end| (end, led)).ok_or(NO_NEARER);
         }
-        let distance = |at: &[f64]| self.distance(at).unwrap_or(f64::INFINITY);
-        let few = self.problem.layout().states.len() <= MOST_STATES;
-        let filter = few.then(|| self.problem(self.first_memory(&last, control))).flatten();
-        // It leads a start only, and its errors are compared with the noise, which no robust loss is.
-        let settings = Settings { loss: None, ..self.problem.settings.clone() };
-        let squared = Problem { settings, ..self.problem.clone() };
-        match shoot((&squared, &self.movement, filter.as_ref()), &last, control) {
+        let nearest = self.distance(nearer.as_deref().unwrap_or(start));
+        match self.better_shot(&last, start, control) {
             Ok(shot) => {
                 let led = Led { evaluations: led.evaluations + shot.evaluations, ..led };
-                let nearest = distance(nearer.as_deref().unwrap_or(start));
-                match shot.explains() || distance(&shot.coordinates) < nearest {
+                match shot.explains() || self.distance(&shot.coordinates) < nearest {
                     true => Ok((shot.coordinates.clone(), Led { shot: Some(Arc::new(shot)), ..led })),
                     false => nearer.map(|end| (end, led)).ok_or(NO_NEARER),
                 }
@@ -195,17 +183,47 @@ impl Stages<'_> {
         }
     }
 
+    /// Multiple shooting from the end of stages, and where it is lost, from their start as well, since stages may lead away from the answer: the one
+    /// that explains the measurements, or whose simulation is nearer to them.
+    ///
+    /// # Errors
+    /// Why there are no pieces that can be run.
+    fn better_shot(&self, last: &[f64], start: &[f64], control: &Control) -> Result<Shot, &'static str> {
+        let shot = self.shot(last, control);
+        if last == start || control.stops() || shot.as_ref().is_ok_and(|shot| !shot.is_lost()) {
+            return shot;
+        }
+        let Ok(again) = self.shot(start, control) else { return shot };
+        let Ok(shot) = shot else { return Ok(again) };
+        let evaluations = shot.evaluations + again.evaluations;
+        let better = again.explains() || self.distance(&again.coordinates) < self.distance(&shot.coordinates);
+        Ok(Shot { evaluations, ..if better { again } else { shot } })
+    }
+
+    /// Multiple shooting from a point.
+    ///
+    /// # Errors
+    /// Why there are no pieces that can be run.
+    pub fn shot(&self, from: &[f64], control: &Control) -> Result<Shot, &'static str> {
+        let few = self.problem.layout().states.len() <= MOST_STATES;
+        let filter = few.then(|| self.problem(self.first_memory(from, control))).flatten();
+        // It leads a start only, and its errors are compared with the noise, which no robust loss is.
+        let settings = Settings { loss: None, ..self.problem.settings.clone() };
+        let squared = Problem { settings, ..self.problem.clone() };
+        shoot((&squared, &self.movement, filter.as_ref()), from, control)
+    }
+
     /// The end of the stages from a start that is nearer to the measurements, if there is one, the last end, and what led there. With a short memory the
     /// predictions depend little on the parameters, beside the noise of the measurements: where the last predictions are not near these, the stages are
     /// repeated from the start with a longer first memory, as long as their end comes nearer. Nearer is an end from which a simulation is.
     fn filtered(&self, start: &[f64], control: &Control) -> (Option<Vec<f64>>, Vec<f64>, Led) {
         let (mut memory, longest) = (self.first_memory(start, control), self.movement.rate.recip());
-        let (mut found, mut nearest): (_, f64) = (None, self.distance(start).unwrap_or(f64::INFINITY));
+        let (mut found, mut nearest) = (None, self.distance(start));
         let mut evaluations = 0;
         loop {
             let (coordinates, led, near) = self.lead_from(start, memory, control);
             evaluations += led.evaluations;
-            let distance = self.distance(&coordinates).unwrap_or(f64::INFINITY);
+            let distance = self.distance(&coordinates);
             let no_better = found.is_some() && distance > BETTER * nearest;
             if distance < nearest {
                 (found, nearest) = (Some((coordinates.clone(), led.clone())), distance);
@@ -220,7 +238,7 @@ impl Stages<'_> {
 
     /// The end of the stages from a start, of which the first one has this memory (s), and whether its predictions are near the measurements. The
     /// last stage is the first one after which a simulation follows the measurements as well as the predictions do, one that does not explain them,
-    /// or the one before a stage that fails.
+    /// or the one before a stage that fails, or whose search is stuck away from measurements that it was near.
     fn lead_from(&self, start: &[f64], mut memory: f64, control: &Control) -> (Vec<f64>, Led, bool) {
         let (mut coordinates, mut led, mut near) = (start.to_vec(), Led::default(), false);
         for stage in 1..=MOST {
@@ -231,14 +249,18 @@ impl Stages<'_> {
             memory *= LONGER;
             let plain = problem.in_units(control);
             let Ok(end) = search(&plain, &problem.settings.optimizer, coordinates.clone()) else { break };
-            coordinates = end.coordinates;
-            led.stages = stage;
             led.evaluations += end.evaluations;
-            let Some(predicted) = errors(&problem, &coordinates, control) else { break };
-            let parts = || predicted.iter().zip(&self.movement.outputs).filter(|(_, moves)| moves.half > 0.0);
-            near = parts().all(|(error, moves)| *error <= NEAR * moves.noise);
+            let predicted = errors(&problem, &end.coordinates, control);
+            let are_near = |errors: &Vec<f64>| self.are_within(errors, |moves| NEAR * moves.noise);
+            let is_near = predicted.as_ref().is_some_and(are_near);
+            // With this memory the cost of a chaotic plant is too rough: the stage before was nearer to the answer.
+            if near && !is_near && !end.outcome.converged() {
+                break;
+            }
+            (coordinates, led.stages, near) = (end.coordinates, stage, is_near);
+            let Some(predicted) = predicted else { break };
             // A longer memory explains still less.
-            if parts().any(|(error, moves)| *error > UNEXPLAINED * moves.half) {
+            if !self.are_within(&predicted, |moves| UNEXPLAINED * moves.half) {
                 break;
             }
             let simulated = errors(self.problem, &coordinates, control);
@@ -251,11 +273,16 @@ impl Stages<'_> {
         (coordinates, led, near)
     }
 
-    /// The sum over the outputs of the mean square error of a simulation, in units of half the range; `None` where it cannot be evaluated.
-    fn distance(&self, at: &[f64]) -> Option<f64> {
-        let errors = errors(self.problem, at, &Control::NEVER)?;
+    /// The sum over the outputs of the mean square error of a simulation, in units of half the range; infinite where it cannot be evaluated.
+    fn distance(&self, at: &[f64]) -> f64 {
+        let Some(errors) = errors(self.problem, at, &Control::NEVER) else { return f64::INFINITY };
         let parts = errors.iter().zip(&self.movement.outputs).filter(|(_, moves)| moves.half > 0.0);
-        Some(parts.map(|(error, moves)| (error / moves.half).powi(2)).sum::<f64>())
+        parts.map(|(error, moves)| (error / moves.half).powi(2)).sum()
+    }
+
+    /// Whether the errors of all outputs that move are at most so large.
+    fn are_within(&self, errors: &[f64], most: impl Fn(&Moves) -> f64) -> bool {
+        errors.iter().zip(&self.movement.outputs).all(|(error, moves)| moves.half == 0.0 || *error <= most(moves))
     }
 
     /// The end of stages from the declared start.

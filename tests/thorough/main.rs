@@ -1,4 +1,4 @@
-//! Thousands of fits: coverage of intervals, scatter of estimates. In optimized builds only
+//! Thousands of fits: coverage of intervals, scatter of estimates, far starts. In optimized builds only
 //! (`cargo test --release --test thorough`); others say so and pass.
 
 #[cfg(not(debug_assertions))]
@@ -8,6 +8,8 @@ mod colored;
 mod common;
 #[cfg(not(debug_assertions))]
 mod coverage;
+#[cfg(not(debug_assertions))]
+mod far_starts;
 #[cfg(not(debug_assertions))]
 mod filters;
 #[cfg(not(debug_assertions))]
