@@ -29,11 +29,11 @@ impl Model for Lorenz {
 const TRUTH: Constants = Constants { sigma: 10.0, rho: 28.0, beta: 8.0 / 3.0 };
 
 /// Twenty seconds, in which an error of the start grows by `exp(18)`, from parameters up to three times off, with noise of 5 %. The best minimum has
-/// smaller errors than the noise that was drawn; another one has many times that. Of 140 records of the example `far_starts` all end there by stages, 127
-/// of them usable; where multiple shooting did not follow a search that is stuck, 135, 67 of them usable.
+/// smaller errors than the noise that was drawn; another one has many times that. Of 40 records of the example `far_starts` all end there, 36
+/// of them usable; where multiple shooting did not follow a search that is stuck, 38, 20 of them usable.
 #[test]
 fn a_chaotic_plant_from_one_output() {
-    const RECORDS: u64 = 20;
+    const RECORDS: u64 = 8;
     let (mut best, mut usable) = (0, 0);
     for seed in 0..RECORDS {
         let mut random = Random(seed);
@@ -53,5 +53,5 @@ fn a_chaotic_plant_from_one_output() {
         usable += u64::from(is_best && found.severity() < Severity::NotUsable);
     }
     println!("at the best minimum {best} of {RECORDS}, usable {usable}");
-    assert!(best >= 19 && usable >= 15, "{best} {usable}");
+    assert!(best >= 8 && usable >= 6, "{best} {usable}");
 }
