@@ -266,8 +266,8 @@ pub trait Sweep: Send + Sync {
         Err("the sweep does not solve outputs for states".to_owned())
     }
 
-    /// Of a filter, the covariance that it comes to around a sample, with its slopes: what is carried after the state. `None` where it does not come to an
-    /// end, and where the one in `carry` differs by more than this part.
+    /// Of a filter, the constant covariance at samples like this one, with its slopes: what is carried after the state. `None` where there is none, and
+    /// where the one in `carry` differs by more than this part.
     fn settled(&self, piece: &Piece<'_>, seeds: &[Seed], sample: usize, carry: &[f64], part: f64) -> Option<Reached> {
         let _ = (piece, seeds, sample, carry, part);
         None

@@ -191,7 +191,7 @@ impl Linear {
         self.entries.last().map_or(self.parameters, |last| last.following.end())
     }
 
-    /// Of a filter, the covariance before a sample that has settled, upper triangle row by row: after what follows from the parameters. `None` where slopes
+    /// Of a filter, the constant covariance before a sample, upper triangle row by row, numbered after what follows from the parameters. `None` where slopes
     /// or noises of outputs are not constant.
     pub fn settling(&self) -> Option<Vec<Following>> {
         let moves = &self.sensors.as_ref()?.moves;

@@ -93,13 +93,15 @@ impl Problem<'_> {
         let problem = Problem { settings: Settings { checkpoint: None, ..self.settings.clone() }, ..self.clone() };
         let shot = problem.stages().ok()?.shot(&found.coordinates(), control).ok()?;
         let start = Start { coordinates: shot.coordinates.clone(), trials, ..Start::declared(&problem) };
-        let again = problem.run_within(begin, control, start).ok()?;
+        let again = problem.run_within(begin, control, start).ok();
+        let [iterations, evaluations] = again.as_ref().map_or([0; 2], |again| [again.iterations, again.evaluations]);
         let work = Summary {
-            iterations: found.iterations + again.iterations,
-            evaluations: found.evaluations + shot.evaluations + again.evaluations,
+            iterations: found.iterations + iterations,
+            evaluations: found.evaluations + shot.evaluations + evaluations,
             seconds: found.seconds + begin.elapsed().as_secs_f64(),
             ..found.clone()
         };
+        let Some(again) = again else { return Some(work) };
         if !again.deviance.zip(found.deviance).is_some_and(|(again, found)| again <= found + SAME) {
             return Some(work);
         }

@@ -196,7 +196,7 @@ impl Stages<'_> {
         let Ok(again) = self.shot(start, control) else { return shot };
         let Ok(shot) = shot else { return Ok(again) };
         let evaluations = shot.evaluations + again.evaluations;
-        let better = again.explains() || self.distance(&again.coordinates) < self.distance(&shot.coordinates);
+        let better = !again.is_lost() || self.distance(&again.coordinates) < self.distance(&shot.coordinates);
         Ok(Shot { evaluations, ..if better { again } else { shot } })
     }
 
@@ -238,7 +238,7 @@ impl Stages<'_> {
 
     /// The end of the stages from a start, of which the first one has this memory (s), and whether its predictions are near the measurements. The
     /// last stage is the first one after which a simulation follows the measurements as well as the predictions do, one that does not explain them,
-    /// or the one before a stage that fails, or whose search is stuck away from measurements that it was near.
+    /// or the one before a stage that fails, or whose search does not converge and is away from measurements that it was near.
     fn lead_from(&self, start: &[f64], mut memory: f64, control: &Control) -> (Vec<f64>, Led, bool) {
         let (mut coordinates, mut led, mut near) = (start.to_vec(), Led::default(), false);
         for stage in 1..=MOST {

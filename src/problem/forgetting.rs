@@ -20,7 +20,7 @@ const SAME: f64 = 1e-11;
 /// Slopes are the same where none differs by more than this part of the largest one of its column: gradients are as near.
 const SAME_SLOPES: f64 = 1e-9;
 
-/// A guess of a covariance is replaced by the one that it comes to where they differ by no more than this part: a step of a search moves it by less.
+/// A guess of a covariance is replaced by the constant one where they differ by no more than this part: a step of a search moves it by less.
 const NEAR: f64 = 0.1;
 
 /// A record in segments.
@@ -176,8 +176,12 @@ impl Objective<'_> {
         let mut guesses = self.guessed_before_run_ins(coordinates, values, part, chains)?;
         for (chain, guesses) in chains.iter().zip(&mut guesses) {
             let Job { seeds, piece, .. } = &chain.whole;
-            let begins = chain.run_ins.iter().zip(guesses);
-            for (sample, guess) in begins {
+            let begins = chain.run_ins.iter().zip(chain.segments).zip(guesses);
+            // Where a measurement is missing before, the guess is nearer than the constant covariance.
+            let complete = |(sample, segment): (&usize, &Range<usize>)| {
+                !piece.prepared.misses(piece.record, segment.start..*sample)
+            };
+            for ((sample, _), guess) in begins.filter(|((sample, segment), _)| complete((sample, segment))) {
                 if let Some(settled) = self.sweep.settled(piece, seeds, *sample, &guess.carry, NEAR) {
                     let (states, all) = (guess.carry.len() - settled.carry.len(), seeds.len());
                     guess.carry[states..].copy_from_slice(&settled.carry);

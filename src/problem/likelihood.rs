@@ -9,7 +9,8 @@ const ROWS: usize = 8;
 const SAFE: f64 = 1e-37;
 
 /// For standardized errors `z` and their predicted variances `v`, zero where nothing was measured: adds `z^2 + ln v` to the sum of each lane, and
-/// writes `(z^2 - 1) / sqrt(2)`, the error of the variance's row, over `v`. Where variances repeat themselves there is a row for each output, which is left as it is.
+/// writes `(z^2 - 1) / sqrt(2)`, the error of the variance's row, over `v`. Where variances repeat themselves there is a row for each output,
+/// which is left as it is.
 pub(super) struct Likelihood<'l> {
     pub rows: &'l [f64],
     pub variances: &'l mut [f64],

@@ -417,7 +417,13 @@ impl Triangulation {
                 let Some((defect, slopes)) = chains.first().map(Chain::begin) else { continue };
                 let (mut carry, mut slopes) = (carry.clone(), slopes.to_vec());
                 carry.iter_mut().zip(defect).for_each(|(carry, defect)| *carry += defect);
+                // Entries that are no seeds depend on parameters alone.
                 slopes.resize(carry.len() * scales.len(), 0.0);
+                for i in carried..carry.len() {
+                    for (m, unknown) in of.parameters.iter().enumerate() {
+                        slopes[i * scales.len() + unknown] = of.slopes[i * seeds + carried + m];
+                    }
+                }
                 corrected.push(Reached { carry, slopes });
             }
         }

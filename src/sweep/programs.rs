@@ -275,6 +275,7 @@ impl Sweep for ProgramSweep<'_> {
     }
 
     fn settled(&self, piece: &Piece<'_>, seeds: &[Seed], sample: usize, carry: &[f64], part: f64) -> Option<Reached> {
+        self.programs.crossed.as_ref().filter(|_| self.programs.predictor.is_filter())?;
         let compiled = self.programs.program(piece.record, seeds, Purpose::Rows)?;
         let length = piece.prepared.lengths(piece.record).after(sample);
         let numbers = Crossing::new(compiled.crossed.as_ref()?, &[piece]).settled(0, length)?;

@@ -100,6 +100,7 @@ impl Window {
         self.values.fill(0.0);
         self.variances.fill(0.0);
         self.measured.fill(0);
+        (self.settled, self.repeated) = (0, false);
     }
 
     /// All rows, one after the other, of the samples that the longest lane has.

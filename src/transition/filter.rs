@@ -1,10 +1,10 @@
-//! [`Filter`]: the covariance that a filter of linear equations comes to.
+//! [`Filter`]: the constant covariance of a filter of linear equations.
 
 use super::product;
 use crate::scalar::Scalar;
 use nalgebra::DMatrix;
 
-/// Doublings in which it has to come to an end: a million samples.
+/// Doublings in which it has to become constant: a million samples.
 const DOUBLINGS: usize = 20;
 /// The doubling ends where the next one would change no variance by more than this part; corrections follow, each of which squares what is left.
 const DOUBLED: f64 = 1e-8;
@@ -12,8 +12,8 @@ const DOUBLED: f64 = 1e-8;
 const CORRECTIONS: usize = 6;
 /// A covariance is right where a sample changes it by no more than this part of the standard deviations: roundings of some products.
 const RIGHT: f64 = 1e-14;
-/// What is left of a change is negligible where all products of an entry of its transition and the mirror image are below this.
-const NEGLIGIBLE: f64 = 1e-20;
+/// What is left of a deviation from the state is negligible where no entry, in standard deviations, is above this: of a covariance its square is left.
+const NEGLIGIBLE: f64 = 1e-10;
 
 /// What a sample and the interval after it do to a covariance `P`: measurements `c x` of some variance correct it, one by one; then it becomes
 /// `F P F' + Q`. Matrices row by row.
@@ -69,7 +69,7 @@ impl<S: Scalar> Filter<S> {
         let Next { covariance, left, .. } = self.next(&here);
         let left: Vec<f64> = left.iter().map(Scalar::value).collect();
         let change = covariance.iter().zip(&here).map(|(next, here)| *next - *here).collect();
-        let change = sum_over_samples(self.n, left, change);
+        let change = sum_over_samples(self.n, left, change, settled);
         let covariance: Vec<S> = here.iter().zip(change).map(|(here, change)| *here + change).collect();
         let variances = self.next(&covariance).variances;
         [covariance, variances]
@@ -77,8 +77,9 @@ impl<S: Scalar> Filter<S> {
 }
 
 impl Filter<f64> {
-    /// The covariance before a sample after so many of them that it changes no more; `None` where it does not come to that. States that no noise reaches have none. By doubling (E. K.-W. Chu, H.-Y. Fan, W.-W. Lin, C.-S. Wang, International Journal of
-    /// Control 77 (2004) 767-788), then by Newton's method (G. A. Hewer, IEEE Transactions on Automatic Control 16 (1971) 382-384).
+    /// The constant covariance before a sample; `None` where there is none. States that no noise reaches have no variance. By doubling
+    /// (E. K.-W. Chu, H.-Y. Fan, W.-W. Lin, C.-S. Wang, International Journal of Control 77 (2004) 767-788), then by Newton's method
+    /// (G. A. Hewer, IEEE Transactions on Automatic Control 16 (1971) 382-384).
     pub fn settled(&self) -> Option<Vec<f64>> {
         let n = self.n;
         let reached = self.reached();
@@ -124,7 +125,8 @@ impl Filter<f64> {
             if (0..n * n).all(|at| change[at].abs() <= RIGHT * size(at)) {
                 return Some(p);
             }
-            p.iter_mut().zip(sum_over_samples(n, left, change)).for_each(|(p, change)| *p += change);
+            let change = sum_over_samples(n, left, change, &p);
+            p.iter_mut().zip(change).for_each(|(p, change)| *p += change);
         }
         None
     }
@@ -155,16 +157,18 @@ impl Filter<f64> {
     }
 }
 
-/// The sum of `M^k D M'^k` over all `k`.
-fn sum_over_samples<S: Scalar>(n: usize, mut left: Vec<f64>, mut sum: Vec<S>) -> Vec<S> {
-    for doublings in 0..=DOUBLINGS {
+/// The sum of `M^k D M'^k` over all `k`, of a change `D` of this covariance.
+fn sum_over_samples<S: Scalar>(n: usize, mut left: Vec<f64>, mut sum: Vec<S>, settled: &[f64]) -> Vec<S> {
+    let deviations: Vec<f64> = (0..n).map(|i| settled[i * (n + 1)].sqrt()).collect();
+    // States without noise: what they do is no part of the sum.
+    (0..n * n).filter(|at| deviations[at / n] * deviations[at % n] == 0.0).for_each(|at| left[at] = 0.0);
+    for _ in 0..=DOUBLINGS {
         let lifted: Vec<S> = left.iter().map(|entry| S::from(*entry)).collect();
         sum = sum.iter().zip(congruent(n, &lifted, &sum)).map(|(sum, more)| *sum + more).collect();
-        // A nilpotent part vanishes after at most `n` samples; its products are zero from the first one on.
-        if 1 << doublings >= n && (0..n * n).all(|at| (left[at] * left[at % n * n + at / n]).abs() <= NEGLIGIBLE) {
+        left = product(n, &left, &left);
+        if (0..n * n).all(|at| left[at].abs() * deviations[at % n] <= NEGLIGIBLE * deviations[at / n]) {
             break;
         }
-        left = product(n, &left, &left);
     }
     sum
 }
@@ -243,6 +247,26 @@ mod tests {
             assert!((found[at] - right[at]).abs() <= 1e-13 * size, "{at}: {} {}", found[at], right[at]);
         }
         assert!([2, 5, 6, 7, 8].iter().all(|at| found[*at] == 0.0));
+    }
+
+    /// Three states, of which each becomes the next one and the last a third of the first: no power has an entry beside its mirror image. `P_1 = q + P_2`,
+    /// `P_2 = q + P_3`, `P_3 = q + k^2 P_1`, which is `P_1 = 3 q / (1 - k^2)`, with its slope.
+    #[test]
+    fn of_a_cycle_of_states() {
+        let (k, q) = (Dual::<1>::variable(1.0 / 3.0, 0), Dual::from(0.2));
+        let [zero, one] = [0.0, 1.0].map(Dual::from);
+        let filter = Filter {
+            n: 3,
+            kept: vec![zero, one, zero, zero, zero, one, k, zero, zero],
+            added: vec![q, zero, zero, zero, q, zero, zero, zero, q],
+            sensors: vec![],
+        };
+        let [found, _] = filter.about(&values(&filter).settled().unwrap());
+        let exact = q * 3.0 / (-(k * k) + 1.0);
+        assert!(
+            (found[0].value / exact.value - 1.0).abs() < 1e-14
+                && (found[0].slopes[0] / exact.slopes[0] - 1.0).abs() < 1e-14
+        );
     }
 
     /// A state that grows, or adds up its noise, and is not measured. After a measurement without noise what a sample adds is left.

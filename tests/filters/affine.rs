@@ -2,7 +2,7 @@
 //! vector. Noise levels are among the unknowns.
 
 use crate::common::Noise;
-use argmin::core::{CostFunction, Gradient};
+use argmin::core::{CostFunction, Gradient, Jacobian, Operator};
 use core::f64::consts::TAU;
 use greybox::estimate::{CovarianceMethod, NoiseModel};
 use greybox::optimize::{JacobianColumns, LeastSquares};
@@ -669,8 +669,14 @@ fn covariances_that_settle() {
                 assert!(((cost + constant) / exact.value - 1.0).abs() < 1e-12, "{} {}", cost + constant, exact.value);
             }
             // Terms of either sign: measured by their number.
-            for (found, exact) in objective.gradient(&at).unwrap().iter().zip(exact.slopes) {
-                assert!((found - exact).abs() < 1e-10 * constant, "{drift} {records} {change}: {found} {exact}");
+            // The gradient, and the same by all rows, whose segments begin with the slopes that it has left.
+            let (jacobian, residuals) = (objective.jacobian(&at).unwrap(), objective.apply(&at).unwrap());
+            let by_rows = |j: usize| jacobian.iter().zip(&residuals).map(|(row, y)| row[j] * y).sum::<f64>();
+            for (j, found) in objective.gradient(&at).unwrap().iter().enumerate() {
+                for found in [*found, by_rows(j)] {
+                    let exact = exact.slopes[j];
+                    assert!((found - exact).abs() < 1e-10 * constant, "{drift} {records} {change}: {found} {exact}");
+                }
             }
         }
     }

@@ -36,8 +36,8 @@ struct Known {
     parameters: Vec<f64>,
     /// By the bits of the length of an interval (s), and whether they are those of a polynomial.
     numbers: Mutex<FxHashMap<(u64, bool), Numbers>>,
-    /// By the bits of the length of the intervals: with the covariance that a filter comes to, if it does.
-    settled: Mutex<FxHashMap<u64, Option<Numbers>>>,
+    /// With the constant covariance of a filter, if it has one: by the same.
+    settled: Mutex<FxHashMap<(u64, bool), Option<Numbers>>>,
     /// By their number; none where a polynomial is no good.
     bands: Mutex<FxHashMap<i32, Option<Arc<Band>>>>,
 }
@@ -55,11 +55,17 @@ impl Crossed {
         last.clone()
     }
 
-    /// The parameters as a program has them: after them what follows from them and the length of an interval, one of these.
-    fn numbers(&self, known: &Known, lengths: &Lengths, length: f64) -> Numbers {
+    /// What numbers are kept by, and the band of a length.
+    fn key(lengths: &Lengths, length: f64) -> ((u64, bool), i32) {
         let band = Band::of(length);
         let many = length > 0.0 && lengths.between(Band::bounds(band)) >= MANY;
-        let key = (length.to_bits(), many);
+        ((length.to_bits(), many), band)
+    }
+
+    /// The parameters as a program has them: after them what follows from them and the length of an interval, one of these.
+    fn numbers(&self, known: &Known, lengths: &Lengths, length: f64) -> Numbers {
+        let (key, band) = Self::key(lengths, length);
+        let (_, many) = key;
         if let Some(numbers) = lock(&known.numbers).get(&key) {
             return numbers.clone();
         }
@@ -80,15 +86,19 @@ impl Crossed {
         numbers
     }
 
-    /// The parameters, what follows from them and the length of an interval, and the covariance that a filter comes to.
+    /// The parameters, what follows from them and the length of an interval, and the constant covariance of a filter.
     fn settled(&self, known: &Known, lengths: &Lengths, length: f64) -> Option<Numbers> {
-        if let Some(settled) = lock(&known.settled).get(&length.to_bits()) {
+        let (key, _) = Self::key(lengths, length);
+        if let Some(settled) = lock(&known.settled).get(&key) {
             return settled.clone();
         }
         let numbers = self.numbers(known, lengths, length);
-        let covariance = (length > 0.0).then(|| self.linear.settled(&numbers)).flatten();
+        let covariance = self.linear.settled(&numbers);
         let settled = covariance.map(|covariance| Arc::new([&numbers[..], &covariance].concat()));
-        lock(&known.settled).insert(length.to_bits(), settled.clone());
+        let mut kept = lock(&known.settled);
+        if kept.len() * numbers.len() < KEPT {
+            kept.insert(key, settled.clone());
+        }
         settled
     }
 

@@ -103,7 +103,7 @@ impl<'r> Run<'r> {
             crossing.enter(group, &self.pieces, first + begin);
         }
         let [settled, active] = match (&mut self.settling, &self.crossing) {
-            (Some(settling), Some(crossing)) => settling.enter(group, crossing, &self.pieces, first + begin, samples),
+            (Some(settling), Some(crossing)) => settling.enter(group, crossing, &self.pieces, first + begin),
             _ => [0, u32::MAX],
         };
         window.settled &= settled | !active;
@@ -125,7 +125,7 @@ impl<'r> Run<'r> {
             }
         }
         if let Some(settling) = self.settling.as_mut().filter(|_| settled != 0) {
-            settling.run(inputs, rows, samples, settled);
+            settling.run(inputs, rows, [begin, end], settled);
         }
     }
 
@@ -205,11 +205,10 @@ impl<'r> Run<'r> {
         let ends = self.pieces.iter().zip(&self.space.window.samples).filter(continued).map(|(_, here)| *here);
         let changes = |crossing: &Crossing<'_>| crossing.changes(&self.pieces, begin..begin + samples);
         let changes = self.crossing.as_ref().map_or(vec![], changes);
-        let blocks = match &self.settling {
-            Some(settling) if !settling.stays(&self.pieces, begin, samples) => BLOCK,
-            _ => samples,
-        };
-        let mut cuts: Vec<usize> = ends.chain(changes).chain((blocks..samples).step_by(blocks)).collect();
+        let moves = |settling: &Lanes<'_>| !settling.stays(&self.pieces, begin, samples);
+        let blocks = if self.settling.as_ref().is_some_and(moves) { samples } else { 0 };
+        let blocks = (1..blocks).filter(|k| (begin + k).is_multiple_of(BLOCK));
+        let mut cuts: Vec<usize> = ends.chain(changes).chain(blocks).collect();
         cuts.sort_unstable();
         cuts.dedup();
         cuts

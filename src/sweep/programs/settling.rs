@@ -1,10 +1,10 @@
 //! [`Settling`]: filters of linear equations whose covariances have settled, in the lanes of a run.
 //!
-//! The covariance of such a filter does not depend on what is measured, and where every output is measured at samples that are evenly spaced it comes to
-//! an end, which follows from the parameters. From there on the state alone is carried, by gains that are constant.
+//! The covariance of such a filter does not depend on what is measured. Where every output is measured at samples that are evenly spaced, it becomes
+//! constant, and its value follows from the parameters. From there on the state alone is carried, with constant gains.
 
 use super::crossed::{Crossing, Numbers};
-use crate::engine::{Group, Program, Sampling, Trajectories};
+use crate::engine::{Column, Group, Program, Sampling, Trajectories};
 use crate::graph::{Following, Seed};
 use crate::moments::entry;
 use crate::recurrence::Recurrence;
@@ -12,8 +12,10 @@ use crate::sweep::{Piece, Reached, Window};
 use crate::wide::{self, Task, Wide};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
-/// Samples after which covariances are compared with those that they come to.
+/// Samples after which covariances are compared with constant ones: a part of a window.
 pub(super) const BLOCK: usize = 32;
+/// In shorter records the samples of constant covariance save less than it takes to find that.
+const WORTH: usize = 1_000;
 /// A covariance has settled where no entry is off by more than this part of the standard deviations; later ones are nearer.
 const NEAR: f64 = 1e-10;
 /// And its slopes where none is off by more than this part of the largest one with respect to the same quantity.
@@ -29,6 +31,20 @@ pub(super) struct Settling {
     program: OnceLock<Option<Program>>,
     /// Those of the runs that have ended.
     idle: Mutex<Vec<Group>>,
+}
+
+/// The length of the intervals (s) from so many samples of a piece on, `after` its first one; `None` where it changes, where a measurement is missing, and
+/// in short records.
+fn even(piece: &Piece<'_>, after: usize, samples: usize) -> Option<f64> {
+    let Piece { record, prepared, samples: all, .. } = piece;
+    let here = all.start + after..all.end.min(all.start + after + samples);
+    if record.len() < WORTH || prepared.misses(record, here.clone()) {
+        return None;
+    }
+    let lengths = prepared.lengths(record);
+    let length = lengths.after(here.start);
+    let one = length > 0.0 && (lengths.count() == 1 || here.clone().all(|sample| lengths.after(sample) == length));
+    one.then_some(length)
 }
 
 impl Settling {
@@ -47,14 +63,16 @@ impl Settling {
         Some(Settling { recurrence, covariance, seeds, sampling, trajectories, program, idle })
     }
 
-    /// The program, to take turns with that of filters which have not settled; none where the two read other columns.
+    /// The program, for use beside that of filters which have not settled; none where the two read other columns or have other lanes.
     fn program(&self, unsettled: &Program) -> Option<&Program> {
         let make = || {
             let program = Program::compile(&self.recurrence, &self.seeds, self.sampling, self.trajectories).ok()?;
             let alike = program.columns() == unsettled.columns()
                 && program.reads_next() == unsettled.reads_next()
                 && program.width() == unsettled.width()
-                && program.outputs() == unsettled.outputs();
+                && program.outputs() == unsettled.outputs()
+                && program.lanes_for(usize::MAX) == unsettled.lanes_for(usize::MAX)
+                && !program.columns().iter().any(|column| matches!(column, Column::Derived(_)));
             alike.then_some(program)
         };
         self.program.get_or_init(make).as_ref()
@@ -101,7 +119,7 @@ impl Settling {
     }
 }
 
-/// What the covariance of a lane comes to.
+/// The constant covariance of a lane.
 struct Limit {
     covariance: Vec<f64>,
     slopes: Vec<f64>,
@@ -117,7 +135,7 @@ struct Lane {
     /// The length of the intervals (s) for which `limit` was asked.
     length: Option<f64>,
     limit: Option<Arc<Limit>>,
-    /// Whether it has come to that.
+    /// Whether the covariance is that.
     settled: bool,
 }
 
@@ -148,37 +166,34 @@ impl<'r> Lanes<'r> {
     /// Whether all lanes are settled that have samples left, and stay so for so many.
     pub fn stays(&self, pieces: &[Piece<'_>], after: usize, samples: usize) -> bool {
         self.lanes.iter().zip(pieces).all(|(lane, piece)| {
-            let begin = (piece.samples.start + after).min(piece.samples.end);
-            let end = piece.samples.end.min(begin + samples);
-            begin == end || lane.settled && !piece.prepared.misses(piece.record, begin..end)
+            after >= piece.samples.len() || lane.settled && lane.length == even(piece, after, samples)
         })
     }
 
-    /// Before so many samples with intervals of one length, `after` the first of each piece: lanes settle that have come to it, and those that miss a measurement there go on with
-    /// the covariance that they have. Returns by bits which lanes are settled, and which have samples at all.
+    /// Before samples that are `after` the first of each piece. Where a block begins, lanes settle whose covariance has become constant, and those that miss a
+    /// measurement in it, or have intervals of another length, go on with the covariance that they have. Blocks are counted from the begin of each piece,
+    /// so that a lane's bits do not depend on others. Returns by bits which lanes are settled, and which have samples at all.
     pub fn enter(
         &mut self,
         group: &mut Group,
         crossing: &Crossing<'_>,
         pieces: &[Piece<'_>],
         after: usize,
-        samples: usize,
     ) -> [u32; 2] {
         let (mut settled, mut active, mut changed) = (0, 0, false);
         for (number, piece) in pieces.iter().enumerate().filter(|(_, piece)| after < piece.samples.len()) {
             active |= 1 << number;
-            let begin = piece.samples.start + after;
-            let length = piece.prepared.lengths(piece.record).after(begin);
-            let end = piece.samples.end.min(begin + samples);
-            let misses = piece.prepared.misses(piece.record, begin..end);
-            let same = !misses && self.lanes[number].length == Some(length);
-            if self.lanes[number].settled && !same {
-                let Reached { carry, slopes } = self.reached(number);
-                group.resume(number, &carry, &slopes);
-                self.lanes[number].settled = false;
-            } else if !self.lanes[number].settled && !misses && self.settles(group, crossing, piece, number, length) {
-                changed = true;
-                self.lanes[number].settled = true;
+            if after.is_multiple_of(BLOCK) {
+                let length = even(piece, after, BLOCK);
+                if !self.lanes[number].settled {
+                    let settles = length.is_some_and(|length| self.settles(group, crossing, piece, number, length));
+                    changed |= settles;
+                    self.lanes[number].settled = settles;
+                } else if self.lanes[number].length != length {
+                    let Reached { carry, slopes } = self.reached(number);
+                    group.resume(number, &carry, &slopes);
+                    self.lanes[number].settled = false;
+                }
             }
             settled |= u32::from(self.lanes[number].settled) << number;
         }
@@ -188,7 +203,7 @@ impl<'r> Lanes<'r> {
         [settled, active]
     }
 
-    /// Whether a lane has come to the end of its covariance; then its group has it.
+    /// Whether the covariance of a lane has become constant; then the group of settled lanes takes it over.
     fn settles(
         &mut self,
         group: &Group,
@@ -242,12 +257,16 @@ impl<'r> Lanes<'r> {
         }
     }
 
-    /// Runs the lanes, and replaces the rows of those that are settled: of each sample the rows of errors, then those of variances.
-    pub fn run(&mut self, inputs: &[f64], rows: &mut [f64], samples: usize, settled: u32) {
+    /// Runs the lanes over a part of a window, and replaces the rows of those that are settled: of each sample the rows of errors, then those of variances.
+    pub fn run(&mut self, inputs: &[f64], rows: &mut [f64], [begin, end]: [usize; 2], settled: u32) {
+        let samples = end - begin;
         let Some(group) = &mut self.group else { return };
         let (lanes, sample) = (group.lanes(), self.variances.len());
         self.rows.resize((samples * sample).max(self.rows.len()), 0.0);
-        group.run(inputs, &mut self.rows, samples);
+        match begin {
+            0 => group.run(inputs, &mut self.rows, samples),
+            _ => group.go_on(inputs, &mut self.rows, samples),
+        }
         let settled: Vec<f64> = (0..lanes).map(|lane| f64::from(settled >> lane & 1)).collect();
         for (rows, own) in rows.chunks_exact_mut(2 * sample).zip(self.rows.chunks_exact(sample)).take(samples) {
             let (errors, variances) = rows.split_at_mut(sample);
@@ -344,7 +363,7 @@ impl Limit {
         (0..seeds).all(|seed| {
             let relative = |slopes: &[f64], (i, j): (usize, usize)| {
                 let (slope, size) = (slopes[entry(n, i, j) * seeds + seed].abs(), self.size(n, i, j));
-                if slope == 0.0 { 0.0 } else { slope / size }
+                if size > 0.0 { slope / size } else { 0.0 }
             };
             let largest = |slopes: &[f64]| pairs().map(|pair| relative(slopes, pair)).fold(0.0, f64::max);
             let largest = largest(&self.slopes).max(largest(begin));
