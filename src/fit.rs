@@ -253,7 +253,7 @@ impl<'a, M: Made> Fit<'a, M> {
     /// starts by itself.
     ///
     /// Where no simulation follows the measurements after the last stage, multiple shooting goes on from there
-    /// ([`multiple_shooting`](Fit::multiple_shooting)), or from the start where that comes to nothing. It does so, too, where the search after the last
+    /// ([`multiple_shooting`](Fit::multiple_shooting)), or from the start where its gaps stay open or its errors large. It does so, too, where the search after the last
     /// stage is stuck, as on the rough cost of a chaotic plant. A start is kept where a simulation from their end is no nearer to the measurements, nor
     /// are the pieces near them. Stages need a simulation to be predicted ([`FreeRun`](crate::FreeRun), the default), and no pre-filter; where the
     /// model cannot be read as a graph, has more than six states, or its integrator chooses its steps, they are multiple shooting alone. The estimate says

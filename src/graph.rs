@@ -33,7 +33,7 @@ mod trace;
 
 pub(crate) use choices::{Choices, choices};
 pub use differentiate::Seed;
-pub(crate) use differentiate::{Following, Pattern, Tangent, Variables, Way, slopes};
+pub(crate) use differentiate::{Following, Pattern, Tangent, Variables, Way, narrow, slopes};
 pub use function::{Function, Function2};
 pub(crate) use node::{Constant, Node};
 pub use node::{Id, Leaf};

@@ -3,7 +3,7 @@
 use super::degree::{Degree, degrees};
 use super::{Equations, Jacobian, evaluate};
 use crate::dual::Dual;
-use crate::graph::{Following, Graph, Id, Leaf, Node};
+use crate::graph::{Following, Graph, Id, Leaf, Node, narrow};
 use crate::layout::Kind;
 use crate::moments::entry;
 use crate::scalar::Scalar;
@@ -298,10 +298,6 @@ fn moving(graph: &Graph, root: Id, parameters: usize) -> Option<Vec<bool>> {
         }
     }
     Some(moving)
-}
-
-fn narrow(i: usize) -> u32 {
-    u32::try_from(i).unwrap_or(u32::MAX)
 }
 
 /// The numbers of those that move.

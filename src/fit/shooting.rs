@@ -47,7 +47,7 @@ impl Shot {
         self.gap <= CLOSED && self.misfit <= EXPLAINS
     }
 
-    /// Whether it came to nothing: gaps stayed open, or the errors are far from the noise.
+    /// Whether gaps stayed open, or the errors are far from the noise.
     pub fn is_lost(&self) -> bool {
         self.gap > CLOSED || self.misfit > NEAR
     }

@@ -1,4 +1,4 @@
-//! Fits that go in stages: asked for, or because their start cannot be simulated or leads to nothing.
+//! Fits that go in stages: asked for, or because their start cannot be simulated or leads to no minimum.
 
 use super::elsewhere::{SAME, leaves_unexplained, work_of};
 use super::refine::{Start, is_only_coarse};
@@ -80,8 +80,8 @@ impl Problem<'_> {
         Some((found, led))
     }
 
-    /// The estimate after multiple shooting from where a search from the end of stages is stuck, with the work of all: the cost of a chaotic plant is
-    /// rough, that of pieces is not. `None` where there is no such end; the estimate as it was where the new one is higher.
+    /// The estimate after multiple shooting from where a search from the end of stages is stuck, with the iterations and evaluations of all: the cost of a chaotic plant
+    /// is rough, that of pieces is not. `None` where there is no such end; the estimate as it was where the new one is higher.
     pub(super) fn shot_further(&self, found: &Summary, led: Option<&Led>, control: &Control) -> Option<Summary> {
         let trials = self.settings.optimizer.most().saturating_sub(found.iterations);
         let is_new = led.is_some_and(|led| led.stages > 0 && led.shot.is_none());

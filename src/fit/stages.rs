@@ -183,8 +183,8 @@ impl Stages<'_> {
         }
     }
 
-    /// Multiple shooting from the end of stages, and where it is lost, from their start as well, since stages may lead away from the answer: the one
-    /// that explains the measurements, or whose simulation is nearer to them.
+    /// Multiple shooting from the end of stages; where its gaps stay open or its errors large, from their start as well, since stages may lead away from
+    /// the minimum. Of two, the second one if it has neither, or if its simulation is nearer to the measurements.
     ///
     /// # Errors
     /// Why there are no pieces that can be run.
@@ -253,7 +253,7 @@ impl Stages<'_> {
             let predicted = errors(&problem, &end.coordinates, control);
             let are_near = |errors: &Vec<f64>| self.are_within(errors, |moves| NEAR * moves.noise);
             let is_near = predicted.as_ref().is_some_and(are_near);
-            // With this memory the cost of a chaotic plant is too rough: the stage before was nearer to the answer.
+            // With this memory the cost of a chaotic plant is too rough: the stage before was nearer to the minimum.
             if near && !is_near && !end.outcome.converged() {
                 break;
             }

@@ -49,6 +49,11 @@ pub(crate) struct Following {
     pub moves: Vec<u32>,
 }
 
+/// A number as leaves have it; no graph has as many as it does not hold.
+pub(crate) fn narrow(i: usize) -> u32 {
+    u32::try_from(i).unwrap_or(u32::MAX)
+}
+
 impl Following {
     /// The leaf of its slope.
     fn slope(&self, seed: &Seed) -> Option<Leaf> {

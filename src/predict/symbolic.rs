@@ -4,7 +4,7 @@ use super::plant::identity;
 use super::{Moments, Plant, Prediction, StartsFrom};
 use crate::equations::{AllMoments, Equations, Jacobian, MomentsOf, Slopes};
 use crate::functions::Functions;
-use crate::graph::{Following, Graph, Id, Leaf, Node, Symbol, Untraceable};
+use crate::graph::{Following, Graph, Id, Leaf, Node, Symbol, Untraceable, narrow};
 use crate::integrate::{Method, Stuck};
 use crate::layout::{Kind, Layout};
 use crate::record::Holds;
@@ -41,16 +41,12 @@ pub(crate) fn settled(
     let covariance = linear.settling()?;
     let made = carrying(equations, method, predictor, holds, &covariance).ok()?;
     let layout = equations.layout();
-    // It goes on from a state that depends on all that there is.
+    // The state that it begins with depends on all states and parameters.
     let states = (0..layout.states.len()).map(|i| Leaf::State(narrow(i)));
     let state = states.chain((0..layout.parameters.len()).map(|j| Leaf::Parameter(narrow(j)))).collect();
     let started = Started { states: layout.states.len(), state, rest: vec![] };
     let following = [linear.following(), covariance.clone()].concat();
     Some((made.started(started).with_following(following), covariance))
-}
-
-fn narrow(i: usize) -> u32 {
-    u32::try_from(i).unwrap_or(u32::MAX)
 }
 
 /// A recurrence in which the last entries of what a predictor carries are not carried, but follow from the parameters.

@@ -65,8 +65,9 @@ impl<'o> Absorber<'o> {
         }
         if window.has_variances() {
             let samples = if self.plain && window.settled != 0 { joined(window) } else { window.len() };
-            let count = samples * window.outputs();
-            self.absorb_rows(lanes, width, &mut window.variance_rows_mut()[..count * columns * lanes], count);
+            let of_variances = samples * window.outputs();
+            let rows = &mut window.variance_rows_mut()[..of_variances * columns * lanes];
+            self.absorb_rows(lanes, width, rows, of_variances);
         }
         self.absorb_rows(lanes, width, window.rows_mut(), count);
     }

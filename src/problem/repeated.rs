@@ -1,12 +1,12 @@
-//! Rows of a window that repeat themselves from sample to sample but for their errors, as two rows that say the same.
+//! Rows of a window that differ from sample to sample in their errors only, as two rows with the same sum of squares.
 
 use crate::sweep::Window;
 use crate::wide::{self, Task, Wide};
 use std::f64::consts::FRAC_1_SQRT_2;
 
 /// Joins the rows of the variances of each output, in lanes where they are the same at all samples: `n` rows `s x + e_k` become `sqrt(n) (s x + mean e)` and
-/// what is left of the errors, in the rows of the first two samples. Returns of how many samples there are rows: all, which are zero after those two, or,
-/// where the rows of the first sample are those of all, two; then errors follow from the standardized ones.
+/// the root of the sum of squares about that mean, in the rows of the first two samples. Returns how many samples have rows then: two where the rows of the
+/// first sample stand for all, whose errors follow from the standardized ones; elsewhere all, with zeros after the first two.
 pub(super) fn joined(window: &mut Window) -> usize {
     let (lanes, outputs, last) = (window.lanes(), window.outputs(), window.columns() - 1);
     let (len, repeated) = (window.len(), window.is_repeated());

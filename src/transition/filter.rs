@@ -43,7 +43,7 @@ struct Next<S> {
 }
 
 impl<S: Scalar> Filter<S> {
-    /// From the covariance before a sample.
+    /// What a sample and the interval after it make of the covariance before it.
     fn next(&self, p: &[S]) -> Next<S> {
         let n = self.n;
         let (mut p, mut left, mut variances) = (p.to_vec(), unit(n), vec![]);
@@ -63,7 +63,7 @@ impl<S: Scalar> Filter<S> {
         Next { covariance, left: product(n, &self.kept, &left), variances }
     }
 
-    /// The settled covariance and the variances of the outputs there, from the value of the covariance.
+    /// The constant covariance, upper and lower triangle, and the variances of the outputs, with their slopes, from its value.
     pub fn about(&self, settled: &[f64]) -> [Vec<S>; 2] {
         let here: Vec<S> = settled.iter().map(|p| S::from(*p)).collect();
         let Next { covariance, left, .. } = self.next(&here);

@@ -30,6 +30,8 @@ mod interval_limits;
 mod judgements;
 mod late_sensor;
 mod long_profile;
+#[path = "../common/lorenz.rs"]
+mod lorenz;
 mod many_records;
 mod models;
 mod narrow_losses;

@@ -1,7 +1,8 @@
 //! Fits that begin at the end of multiple shooting ([`Fit::multiple_shooting`]).
 
 use crate::common::Noise;
-use crate::stages::{Axis, Constants, First, Flow, Force, Lorenz as Hidden, Motion, Position, Pushed};
+use crate::lorenz::{Constants, First, Flow, Lorenz as Hidden};
+use crate::stages::{Axis, Force, Motion, Position, Pushed};
 use greybox::optimize::Outcome;
 use greybox::*;
 use std::time::Duration;

@@ -1,34 +1,12 @@
 //! Fits that go from a far start in stages ([`Fit::staged`]).
 
 use crate::common::Noise;
+use crate::lorenz::{Constants, First, Flow, Lorenz};
 use greybox::optimize::Outcome;
 use greybox::*;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
-
-signals! { pub struct Flow { x: "1", y: "1", z: "1" } }
-signals! { pub struct First { x: "1" } }
-signals! { pub struct Constants { sigma: "1/s", rho: "1", beta: "1/s" } }
-
-/// E. N. Lorenz, *Deterministic nonperiodic flow*, Journal of the Atmospheric Sciences 20 (1963) 130-141, of which `x` alone is measured.
-#[derive(Clone)]
-pub struct Lorenz;
-
-impl Model for Lorenz {
-    type State = Flow;
-    type Input = Nothing;
-    type Output = First;
-    type Parameters = Constants;
-
-    fn derivative<S: Scalar>(&self, _t: S, x: &Flow<S>, _u: &Nothing, p: &Constants<S>) -> Flow<S> {
-        Flow { x: p.sigma * (x.y - x.x), y: x.x * (p.rho - x.z) - x.y, z: x.x * x.y - p.beta * x.z }
-    }
-
-    fn output<S: Scalar>(&self, _t: S, x: &Flow<S>, _u: &Nothing, _p: &Constants<S>) -> First<S> {
-        First { x: x.x }
-    }
-}
 
 /// Ten seconds with noise of 5 %.
 fn lorenz() -> ExperimentOf<Lorenz> {

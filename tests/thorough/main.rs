@@ -18,6 +18,9 @@ mod hardening;
 #[cfg(not(debug_assertions))]
 mod intervals;
 #[cfg(not(debug_assertions))]
+#[path = "../common/lorenz.rs"]
+mod lorenz;
+#[cfg(not(debug_assertions))]
 mod monte_carlo;
 #[cfg(not(debug_assertions))]
 #[path = "../common/random.rs"]

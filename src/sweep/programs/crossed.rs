@@ -36,7 +36,7 @@ struct Known {
     parameters: Vec<f64>,
     /// By the bits of the length of an interval (s), and whether they are those of a polynomial.
     numbers: Mutex<FxHashMap<(u64, bool), Numbers>>,
-    /// With the constant covariance of a filter, if it has one: by the same.
+    /// By the same: these numbers followed by the constant covariance of a filter, if it has one.
     settled: Mutex<FxHashMap<(u64, bool), Option<Numbers>>>,
     /// By their number; none where a polynomial is no good.
     bands: Mutex<FxHashMap<i32, Option<Arc<Band>>>>,

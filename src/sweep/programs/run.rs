@@ -205,7 +205,9 @@ impl<'r> Run<'r> {
         let ends = self.pieces.iter().zip(&self.space.window.samples).filter(continued).map(|(_, here)| *here);
         let changes = |crossing: &Crossing<'_>| crossing.changes(&self.pieces, begin..begin + samples);
         let changes = self.crossing.as_ref().map_or(vec![], changes);
-        let moves = |settling: &Lanes<'_>| !settling.stays(&self.pieces, begin, samples);
+        // To the end of the last block, which may go on after this window.
+        let ahead = (begin + samples).next_multiple_of(BLOCK) - begin;
+        let moves = |settling: &Lanes<'_>| !settling.stays(&self.pieces, begin, ahead);
         let blocks = if self.settling.as_ref().is_some_and(moves) { samples } else { 0 };
         let blocks = (1..blocks).filter(|k| (begin + k).is_multiple_of(BLOCK));
         let mut cuts: Vec<usize> = ends.chain(changes).chain(blocks).collect();

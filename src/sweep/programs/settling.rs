@@ -16,7 +16,8 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 pub(super) const BLOCK: usize = 32;
 /// In shorter records the samples of constant covariance save less than it takes to find that.
 const WORTH: usize = 1_000;
-/// A covariance has settled where no entry is off by more than this part of the standard deviations; later ones are nearer.
+/// A covariance has settled where no entry is off by more than this part of the standard deviations. Later ones are nearer, so that the likelihood is off by
+/// this part of a few of its terms.
 const NEAR: f64 = 1e-10;
 /// And its slopes where none is off by more than this part of the largest one with respect to the same quantity.
 const NEAR_SLOPES: f64 = 1e-8;
@@ -29,7 +30,7 @@ pub(super) struct Settling {
     sampling: Sampling,
     trajectories: Trajectories,
     program: OnceLock<Option<Program>>,
-    /// Those of the runs that have ended.
+    /// Groups of runs that have ended.
     idle: Mutex<Vec<Group>>,
 }
 
@@ -48,7 +49,7 @@ fn even(piece: &Piece<'_>, after: usize, samples: usize) -> Option<f64> {
 }
 
 impl Settling {
-    /// Of a recurrence in which these entries of the covariance follow from the parameters; none with slopes with respect to them.
+    /// With the recurrence of settled filters, and the numbers of the entries of their covariance. `None` if one of these is a seed: they are not carried.
     pub fn new(
         recurrence: Recurrence,
         covariance: Vec<Following>,
