@@ -155,6 +155,8 @@ pub mod graph;
 #[cfg(feature = "csv")]
 pub mod guide;
 #[cfg(feature = "std")]
+mod hash;
+#[cfg(feature = "std")]
 pub mod information;
 #[cfg(feature = "std")]
 mod judge;

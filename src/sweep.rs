@@ -297,10 +297,10 @@ pub trait Sweep: Send + Sync {
         None
     }
 
-    /// Whether an input has a dead time.
-    fn is_late(&self, parameters: &[f64]) -> bool {
+    /// Which inputs have a dead time; empty if none can have one.
+    fn late(&self, parameters: &[f64]) -> Vec<bool> {
         let _ = parameters;
-        false
+        vec![]
     }
 
     /// The exact cause of a failure that was noticed at `sample`: an `Err` where the simulation cannot go on. Where nothing fails,

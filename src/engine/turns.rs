@@ -53,26 +53,30 @@ impl Turns {
 /// The same, with each new value of what is carried written `begin` slots beyond its own slot; `None` if that saves no copy.
 fn elsewhere(advance: &[Instruction], carried: usize, begin: Slot) -> Option<Vec<Instruction>> {
     let is_carried = |slot: Slot| usize::from(slot) < carried;
-    let mut advance: Vec<Option<Instruction>> = advance.iter().copied().map(Some).collect();
-    for at in (0..advance.len()).rev() {
-        let Some(Instruction { operation: Operation::Copy, to, pairs: [[from, _], ..], .. }) = advance[at] else {
-            continue;
-        };
-        if !is_carried(to) || is_carried(from) || from >= begin {
-            continue;
+    // Of an instruction, the last copy that carries what it computes: it writes the value to that second slot, and all that read it later read
+    // it there.
+    let (mut carries, mut writer) = (vec![None; advance.len()], vec![None; begin.into()]);
+    for (at, one) in advance.iter().enumerate() {
+        let Instruction { operation, to, pairs: [[from, _], ..], .. } = *one;
+        let copies = operation == Operation::Copy && is_carried(to) && !is_carried(from);
+        if let Some(made) = writer[usize::from(from)].filter(|_| copies) {
+            carries[made] = Some(at);
         }
-        // The instruction that computes the value writes it to its second slot; all that read it later read it there.
-        let Some(made) = (0..at).rev().find(|i| advance[*i].is_some_and(|before| before.to == from)) else { continue };
-        advance[at] = None;
-        for (i, instruction) in advance.iter_mut().enumerate().skip(made) {
-            let read = |slot: Slot| if i > made && slot == from { begin + to } else { slot };
-            let write = |slot: Slot| if i == made { begin + to } else { slot };
-            *instruction = instruction.map(|instruction| instruction.renamed(read, write));
-        }
+        writer[usize::from(to)] = Some(at);
     }
-    if advance.iter().all(Option::is_some) {
+    let mut saved = vec![false; advance.len()];
+    carries.iter().flatten().for_each(|copy: &usize| saved[*copy] = true);
+    if !saved.contains(&true) {
         return None;
     }
+    let mut there: Vec<Slot> = (0..begin).collect();
+    let mut moved = |(at, one): (usize, &Instruction)| {
+        let to = carries[at].map_or(one.to, |copy: usize| begin + advance[copy].to);
+        let renamed = one.renamed(|slot| there[usize::from(slot)], |_| to);
+        there[usize::from(one.to)] = to;
+        (!saved[at]).then_some(renamed)
+    };
+    let advance: Vec<Instruction> = advance.iter().enumerate().filter_map(&mut moved).collect();
     let mut written = vec![false; carried];
     let mut other = |instruction: Instruction| {
         let read = |slot: Slot| if written.get(usize::from(slot)) == Some(&true) { begin + slot } else { slot };
@@ -83,5 +87,5 @@ fn elsewhere(advance: &[Instruction], carried: usize, begin: Slot) -> Option<Vec
         }
         renamed
     };
-    Some(advance.into_iter().flatten().map(&mut other).collect())
+    Some(advance.into_iter().map(&mut other).collect())
 }

@@ -5,6 +5,7 @@
 //! and loss are evaluated at fixed points, and the values are compared.
 
 use super::{Noise, Objective};
+use crate::hash::hexadecimal;
 use crate::record::Record;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
@@ -132,8 +133,7 @@ fn hash(plain: &Objective<'_>) -> String {
         text(&format!("{}{:?}{:?}{}", record.name(), record.holds, record.initial_state(), record.len()));
     }
     problem.records.iter().for_each(|record| numbers(record, &mut hash));
-    let bytes: [u8; 32] = hash.finalize().into();
-    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+    hexadecimal(hash)
 }
 
 /// Time, inputs and outputs of a record.

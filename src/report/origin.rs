@@ -2,6 +2,7 @@
 
 use super::Report;
 use crate::error::Error;
+use crate::hash::hexadecimal;
 use crate::numeral::whole;
 use crate::section::{Cell, Section, Table};
 use core::fmt::Write;
@@ -102,12 +103,7 @@ fn hashed(path: &Path) -> std::io::Result<(u64, String)> {
         hash.update(&buffer[..read]);
         size += read as u64;
     }
-    let hex = hash.finalize().iter().fold(String::new(), |mut hex, byte| {
-        // Writing to a string does not fail.
-        let _ = write!(hex, "{byte:02x}");
-        hex
-    });
-    Ok((size, hex))
+    Ok((size, hexadecimal(hash)))
 }
 
 impl Report {

@@ -5,8 +5,10 @@ use crate::record::Record;
 use crate::transition::Transition;
 use nalgebra::{Complex, DMatrix, Schur};
 
-/// Number of points that are examined.
+/// Number of points that are examined, of models with at most so many states; of larger ones fewer, since the eigenvalues take a time that grows
+/// with the third power of the states.
 const POINTS: usize = 8;
+const STATES: usize = 300;
 const ITERATIONS: usize = 10_000;
 
 /// The state at a sample of an experiment.
@@ -18,7 +20,10 @@ pub(crate) struct StateAt {
 
 /// Those of the points that are examined.
 pub(crate) fn some(points: &[StateAt]) -> impl Iterator<Item = &StateAt> {
-    points.iter().step_by(points.len().div_ceil(POINTS).max(1))
+    let states = points.first().map_or(0, |point| point.state.len());
+    let fewer = (states as f64 / STATES as f64).powi(3).max(1.0);
+    let examined = ((POINTS as f64 / fewer) as usize).max(1);
+    points.iter().step_by(points.len().div_ceil(examined).max(1))
 }
 
 /// The eigenvalues of the state's Jacobian at a point (1/s).
@@ -26,6 +31,29 @@ pub(crate) fn eigenvalues(objective: &Objective<'_>, coordinates: &[f64], at: &S
     let n = at.state.len();
     slopes(objective, coordinates, at, |record, p| objective.sweep.state_slopes(record, at.sample, &at.state, p))
         .and_then(|slopes| eigenvalues_of(n, &slopes))
+}
+
+/// The eigenvalues at a point, if any of them may have an imaginary part beyond a limit (1/s).
+pub(crate) fn oscillating(
+    objective: &Objective<'_>,
+    coordinates: &[f64],
+    at: &StateAt,
+    limit: f64,
+) -> Option<Vec<Complex<f64>>> {
+    let n = at.state.len();
+    let jacobian = |record: &Record, p: &[f64]| objective.sweep.state_slopes(record, at.sample, &at.state, p);
+    let slopes = slopes(objective, coordinates, at, jacobian)?;
+    (imaginary_bound(n, &slopes) > limit).then(|| eigenvalues_of(n, &slopes))?
+}
+
+/// Beyond which no eigenvalue has an imaginary part: the norm of half the difference between a matrix and its transpose (Bendixson, Acta
+/// Mathematica 25 (1902) 359), and the norm of the matrix itself; both as the largest sum of magnitudes in a row.
+fn imaginary_bound(n: usize, matrix: &[f64]) -> f64 {
+    let sum = |i: usize, entry: fn(f64, f64) -> f64| -> f64 {
+        (0..n).map(|j| entry(matrix[i * n + j], matrix[j * n + i]).abs()).sum()
+    };
+    let norm = |entry: fn(f64, f64) -> f64| (0..n).map(|i| sum(i, entry)).fold(0.0, f64::max);
+    norm(|a, _| a).min(norm(|a, transposed| 0.5 * (a - transposed)))
 }
 
 /// The decays of the state about a point (1/s), negative where it decays; of a model whose samples change the state, from one sample to the next.
@@ -104,5 +132,18 @@ mod tests {
         assert!((found[0] + a + 4f64.ln() / h).abs() < 1e-14, "{found:?}");
         let open = eigenvalues(&objective, &objective.start(), &at).unwrap();
         assert!((open[0].re + a).abs() < 1e-14, "{open:?}");
+    }
+
+    /// The bound is reached by a rotation, and is zero where a matrix is symmetric; no matrix has an eigenvalue beyond it.
+    #[test]
+    fn imaginary_parts_are_bounded() {
+        assert_eq!(imaginary_bound(2, &[-0.5, 3.0, -3.0, -0.5]), 3.0);
+        assert_eq!(imaginary_bound(2, &[-1.0, 7.0, 7.0, 2.0]), 0.0);
+        assert_eq!(imaginary_bound(2, &[0.0, 1.0, -100.0, 0.0]), 50.5);
+        for n in 2..12 {
+            let matrix: Vec<f64> = (0..n * n).map(|k| ((k * k * 7919 + 13 * k) % 101) as f64 - 50.0).collect();
+            let largest = eigenvalues_of(n, &matrix).unwrap().iter().map(|value| value.im).fold(0.0, f64::max);
+            assert!(largest <= imaginary_bound(n, &matrix), "{n}: {largest}");
+        }
     }
 }

@@ -186,8 +186,8 @@ impl Sweep for DualSweep<'_> {
         self.place(t, &u, p).jump_slopes(state)
     }
 
-    fn is_late(&self, parameters: &[f64]) -> bool {
-        self.code.late(parameters).contains(&true)
+    fn late(&self, parameters: &[f64]) -> Vec<bool> {
+        self.code.late(parameters)
     }
 
     fn locate(

@@ -5,12 +5,14 @@ use super::{Loops, Piece, Reached, RunError, Seed, Visit};
 use crate::dual::Dual;
 use crate::equations::{AllMoments, Equations, Slopes};
 use crate::functions::{Functions, Handle};
+use crate::hash::hexadecimal;
 use crate::integrate::Duals;
 use crate::layout::{Kind, Layout};
 use crate::model::Model;
 use crate::moments::Moments;
 use crate::scalar::Scalar;
 use crate::signals::Signals;
+use sha2::{Digest, Sha256};
 use std::sync::{Arc, OnceLock};
 
 /// Slopes of a [`Duals`].
@@ -240,8 +242,9 @@ impl ModelCode for Evaluated {
         Some(&self.equations)
     }
 
-    /// The equations as they are written to a file.
+    /// The hash of the equations as they are written to a file, which is too long to be shown.
     fn identity(&self) -> String {
-        serde_json::to_string(&*self.equations).unwrap_or_else(|_| self.equations.to_string())
+        let text = serde_json::to_string(&*self.equations).unwrap_or_else(|_| self.equations.to_string());
+        format!("equations with SHA-256 {}", hexadecimal(Sha256::new_with_prefix(text)))
     }
 }

@@ -308,8 +308,8 @@ impl Sweep for ProgramSweep<'_> {
         self.plain.jump_slopes(record, sample, state, p)
     }
 
-    fn is_late(&self, parameters: &[f64]) -> bool {
-        self.plain.is_late(parameters)
+    fn late(&self, parameters: &[f64]) -> Vec<bool> {
+        self.plain.late(parameters)
     }
 
     fn locate(

@@ -7,6 +7,7 @@ mod engines;
 mod field;
 mod forms;
 mod kinks;
+mod late_output;
 mod left_out;
 mod own_code;
 mod text;

@@ -194,6 +194,8 @@ fn a_column_in_another_unit_is_refused() {
             "w [1/s]",
             "6.283185307179586) if it counts revolutions, or DataFile::factor(\"w\", 1) if",
         ),
+        ("t / s,ud / mV,w / (rad/s),id / A,iq", "ud / mV", "DataFile::factor(\"ud\", 0.001)"),
+        ("t/s,ud/V,w/rpm,id/A,iq", "w/rpm", "DataFile::factor(\"w\", 0.10471975511965977)"),
         ("t,ud,w [V],id,iq", "w [V]", "neither is a multiple of the other"),
         ("t,ud [N m],w,id,iq", "ud [N m]", "DataFile::factor(\"ud\", 1) if the file's unit is wrong"),
     ] {
@@ -204,6 +206,23 @@ fn a_column_in_another_unit_is_refused() {
     // Also where the column is named with its unit.
     says(DataFile::new(&path).column("w", "w [rpm]").read(&Pmsm), &["column `w [rpm]`", "0.10471975511965977"]);
     assert_eq!(DataFile::new(path).factor("w", 0.5).read(&Pmsm).unwrap().input(0).w, 1.0);
+}
+
+/// A quantity over its unit, as standards write it, and a unit of time behind a space.
+#[test]
+fn units_behind_a_bar_and_times_behind_a_space() {
+    for (time, shown) in
+        [("t / ms", "ms"), ("t/ms", "ms"), ("Zeit / ms", "ms"), ("time ms", "ms"), ("Time / (ms)", "ms")]
+    {
+        let path = file("bars", format!("{time};ud / V;w / (rad/s);id/A;iq/A\n0;1;2;3;4\n500;1;2;3;5\n"));
+        let record = DataFile::new(path).read(&Pmsm).unwrap();
+        assert_eq!((record.time(1), record.output(1).iq), (0.5, 5.0), "{time}");
+        let said = record.record().reading().unwrap().to_string();
+        assert_eq!(said, format!("cells between \";\", time \"{time}\" in {shown}"));
+    }
+    // What is no unit stays part of the name.
+    let path = file("ratios", "t,ud/uq,w,id,iq\n0,1,2,3,4\n1,1,2,3,4\n");
+    says(DataFile::new(path).read(&Pmsm), &["no column `ud`", "ud/uq"]);
 }
 
 /// Scales of temperature begin at other zeros: none is taken for another, and the unit that is said converts it. Other units likewise.

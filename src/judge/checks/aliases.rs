@@ -5,8 +5,9 @@
 
 use super::*;
 use crate::record::{Record, Time, steps};
-use crate::residuals::modes::{StateAt, eigenvalues, some};
+use crate::residuals::modes::{StateAt, eigenvalues, oscillating, some};
 use crate::residuals::residual_pass;
+use nalgebra::Complex;
 use std::f64::consts::{PI, TAU};
 
 pub(crate) const ALIASES: Check = Check::new(
@@ -128,7 +129,7 @@ fn unresolved_at<'p>(
     point: &'p StateAt,
     interval: f64,
 ) -> Option<Unresolved<'p>> {
-    let modes = modes(objective, coordinates, point)?;
+    let modes = of(&oscillating(objective, coordinates, point, TAU / (SAMPLES * interval))?);
     let &mode = modes.iter().filter(|mode| is_seen_too_seldom(**mode, interval)).max_by(|a, b| a.1.total_cmp(&b.1))?;
     let alias = alias(mode.1, interval);
     let needed = (alias / mode.1).ln();
@@ -216,8 +217,12 @@ fn least(slopes: &[f64], needed: f64) -> Option<Vec<f64>> {
 
 /// Each oscillation about a point.
 fn modes(objective: &Objective<'_>, coordinates: &[f64], point: &StateAt) -> Option<Vec<Mode>> {
-    let values = eigenvalues(objective, coordinates, point)?;
-    Some(values.iter().filter(|value| value.im > 0.0).map(|value| (value.re, value.im)).collect())
+    Some(of(&eigenvalues(objective, coordinates, point)?))
+}
+
+/// The oscillations among eigenvalues.
+fn of(eigenvalues: &[Complex<f64>]) -> Vec<Mode> {
+    eigenvalues.iter().filter(|value| value.im > 0.0).map(|value| (value.re, value.im)).collect()
 }
 
 /// The oscillation that is nearest to one.

@@ -6,7 +6,7 @@ use crate::record::Record;
 
 pub(crate) const COPIES: Check = Check::new(
     "no column is a copy",
-    "Is an input or an output another column sample by sample, in all records?",
+    "Is an input or an output another column sample by sample, in all records? Inputs with a dead time do not count.",
     &[WarningCode::IdenticalColumns],
     |evidence, _| copies(evidence).into(),
 );
@@ -36,12 +36,16 @@ fn copies(evidence: &Evidence<'_>) -> Vec<Warning> {
     let Some(first) = records.first() else { return vec![] };
     let (inputs, outputs) = (first.inputs().len(), first.outputs().len());
     let same = |a: usize, b: usize| are_same(records.iter().map(|record| (column(record, a), column(record, b))));
+    let parameters = evidence.point.objective.values_of(0, &evidence.point.end.coordinates).p;
+    let late = evidence.point.objective.sweep.late(&parameters);
+    // An input that acts at once and again after a dead time has a column for each.
+    let are_apart = |a: usize, b: usize| b < inputs && [a, b].iter().any(|i| late.get(*i) == Some(&true));
     let name = |i: usize| match i.checked_sub(inputs) {
         None => format!("the input `{}`", first.inputs()[i].name),
         Some(j) => format!("the output `{}`", first.outputs()[j].name),
     };
     let one = |b: usize| {
-        let a = (0..b).find(|a| same(*a, b))?;
+        let a = (0..b).find(|a| !are_apart(*a, b) && same(*a, b))?;
         let what = match (a < inputs, b < inputs) {
             (true, true) => "what each of them does is not told apart",
             (true, false) => "it was not measured",

@@ -51,7 +51,7 @@ fn contradiction(extended: &Extended<'_>, sensor: &Sensor, unknowns: &[Unknown])
     let (said, severities): (Vec<String>, Vec<Severity>) = said.unzip();
     let severity = severities.into_iter().max().filter(|_| chance < LEVEL)?;
     let text = format!(
-        "{} ({}): check unit, gain, zero and filter of the sensor, and what the model leaves out; no interval allows for it",
+        "{} ({}): check unit, gain, zero, filter and dead time of the sensor, and what the model leaves out; no interval allows for it",
         said.join(", or "),
         p_value(chance)
     );

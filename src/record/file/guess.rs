@@ -179,16 +179,21 @@ pub(super) fn names(column: &str, wanted: &str) -> bool {
     column == wanted || (split_unit(column).0 == wanted)
 }
 
-/// A name and the unit behind it: `speed [rpm]`, `time (ms)`.
+/// A name and the unit behind it: `speed [rpm]`, `time (ms)`, `U / V`; behind a bar without spaces, as in `U/V`, only one that is known.
 pub(super) fn split_unit(name: &str) -> (&str, Option<&str>) {
     for (open, close) in [('[', ']'), ('(', ')')] {
-        if let Some((before, unit)) = name.strip_suffix(close).and_then(|name| name.rsplit_once(open))
-            && !before.trim().is_empty()
-        {
-            return (before.trim_end(), Some(unit.trim()));
+        let parts = name.strip_suffix(close).and_then(|name| name.rsplit_once(open));
+        let parts = parts.map(|(before, unit)| (before.trim_end_matches([' ', '/']), unit.trim()));
+        if let Some((before, unit)) = parts.filter(|(before, _)| !before.trim().is_empty()) {
+            return (before, Some(unit));
         }
     }
-    (name, None)
+    let spaced = name.split_once(" / ");
+    let quotient = spaced.or_else(|| name.split_once('/').filter(|(_, unit)| is_unit(unit)));
+    match quotient.map(|(before, unit)| (before.trim_end(), unit.trim().trim_matches(BRACKETS))) {
+        Some((before, unit)) if !before.is_empty() && !unit.is_empty() => (before, Some(unit)),
+        _ => (name, None),
+    }
 }
 
 /// Whether a cell holds a number, in any notation, a date, or says that there is none.

@@ -213,9 +213,9 @@ fn shown(named: Option<TimeUnit>, factor: f64) -> TimeUnit {
     }
 }
 
-/// A unit of time behind the name of a column of time: `time_ms`.
+/// A unit of time behind the name of a column of time: `time_ms`, `time ms`.
 fn suffix(name: &str) -> Option<&str> {
-    let (before, unit) = name.rsplit_once(['_', '/'])?;
+    let (before, unit) = name.rsplit_once(['_', ' '])?;
     let before = before.trim().to_lowercase();
     (time_unit(unit).is_some() && (before == "t" || NAMES.contains(&before.as_str()))).then_some(unit)
 }
