@@ -18,6 +18,7 @@ mod search;
 mod shooting;
 mod simulate;
 mod simulated;
+mod slower;
 mod staged;
 mod stages;
 mod start_error;

@@ -23,7 +23,7 @@
 //! | [16](chapter_16_text_models) | models as text files |
 //! | [17](chapter_17_command) | the command: models and records from a shell |
 //! | [18](chapter_18_python) | Python: models, frames, results, options |
-//! | [19](chapter_19_clusters) | fleets on Spark and Dask |
+//! | [19](chapter_19_clusters) | fleets on Spark, Dask and Ray |
 //! | [20](chapter_20_process_noise) | a plant that is disturbed: process noise |
 
 /// A chapter: its text, after the pictures that it names. A picture is a link definition with the image in it, so that the

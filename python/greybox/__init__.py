@@ -49,7 +49,7 @@ from numpy import (
     tanh,
 )
 
-from greybox import dask, pmsm, spark
+from greybox import dask, pmsm, ray, spark
 from greybox._core import Parameter, __version__
 from greybox.align import align
 from greybox.bootstrap import Bootstrap
@@ -115,6 +115,7 @@ __all__ = [
     "minimum",
     "model",
     "pmsm",
+    "ray",
     "read",
     "sign",
     "signals",

@@ -17,7 +17,6 @@ __all__ = ["fleet"]
 
 #: Records that are handed to a worker together.
 _BATCH = 1000
-_COLUMN = "greybox_batch"
 _TYPES = {float: "double", int: "long", str: "string"}
 
 
@@ -39,19 +38,20 @@ def fleet(
 ) -> Any:
     """Fit many records, each by itself, on the workers of a cluster.
 
-    The records are shuffled into batches by a hash of `by`, unless they lie in whole partitions, and each batch is one call of a worker,
-    which uses one core. A task that is tried again gives the same bits. The workers need the package greybox.
+    The records are shuffled into batches by a hash of `by`, unless they lie in whole partitions, and each batch is one partition and one call
+    of a worker, which uses one core. A task that is tried again gives the same bits. The workers need the package greybox.
 
     Parameters
     ----------
     frame : pyspark.sql.DataFrame
         The samples of all records, in any order.
     batches : int, optional
-        Into how many parts the records are divided; without it they are counted, for 1,000 records to a part and at least one part
-        for each core.
+        Into how many parts the records are divided; without it they are counted, for some 1,000 records to a part at most, and as many
+        parts for each core.
     whole : bool
-        The samples of each record lie in one partition of the frame already, such as one file of whole records: nothing is shuffled, which
-        costs more than the fits, and a partition is one call. A record that lies in two partitions would be fitted twice, in parts.
+        The samples of each record lie in one partition of the frame already, such as one file of whole records: nothing is shuffled, and a
+        partition is one call. A record that lies in two partitions would be fitted twice, in parts. Spark cuts files into several partitions,
+        unless ``spark.sql.files.openCostInBytes`` and ``spark.sql.files.maxPartitionBytes`` are both larger than the largest file.
     model, by, parameters, time, sample_time, columns, hold, initial, **given
         As in :func:`greybox.fleet`.
 
@@ -72,8 +72,6 @@ def fleet(
             f"{type(frame).__module__}.{type(frame).__name__} is no frame of Spark; fit it on this machine by gb.fleet, or hand over "
             "spark.createDataFrame(frame)"
         )
-    from pyspark.sql import functions
-
     made = plan(model, by, parameters, Record(None, None, time, sample_time, columns, hold, initial), given)
     needed = made.needed() + _time(made, frame.columns)
     missing = [name for name in needed if name not in frame.columns]
@@ -86,11 +84,10 @@ def fleet(
         return frame.select(*needed).mapInArrow(_partition(fit), schema)
     if batches is None:
         records = frame.select(*made.by).distinct().count()
-        batches = max(-(-records // _BATCH), frame.sparkSession.sparkContext.defaultParallelism)
-    batch = functions.pmod(functions.xxhash64(*made.by), functions.lit(batches))
+        cores = frame.sparkSession.sparkContext.defaultParallelism
+        batches = cores * max(1, -(-records // (_BATCH * cores)))
     # A number that is asked for is not changed by adaptive execution, which would make one task of many small parts.
-    parts = frame.select(*needed).withColumn(_COLUMN, batch).repartition(batches, _COLUMN)
-    return parts.groupBy(_COLUMN).applyInArrow(lambda table: fit(table.drop_columns([_COLUMN])), schema)
+    return frame.select(*needed).repartition(batches, *made.by).mapInArrow(_partition(fit), schema)
 
 
 def _time(made: Plan, names: Sequence[str]) -> list[str]:

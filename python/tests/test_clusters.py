@@ -1,4 +1,4 @@
-"""Fleets on Spark and Dask: the rows of one machine, also where a worker is killed in the middle."""
+"""Fleets on Spark, Dask and Ray: the rows of one machine, also where a worker is killed in the middle."""
 
 from __future__ import annotations
 
@@ -64,6 +64,8 @@ def test_frames_of_one_machine_are_refused(bodies: pd.DataFrame) -> None:
         gb.spark.fleet(cooling(), bodies, **SAID)
     with pytest.raises(TypeError, match="polars.*DataFrame is no frame of Dask"):
         gb.dask.fleet(cooling(), pl.from_pandas(bodies), **SAID)
+    with pytest.raises(TypeError, match="pandas.*DataFrame is no dataset of Ray; fit it on this machine by gb.fleet, or .*from_pandas"):
+        gb.ray.fleet(cooling(), bodies, **SAID)
 
 
 @pytest.fixture(scope="module")
@@ -81,8 +83,12 @@ def spark() -> Iterator[Any]:
 
 
 def test_spark(spark: Any, bodies: pd.DataFrame, expected: pd.DataFrame) -> None:
+    from pyspark.sql import functions
+
     frame = spark.createDataFrame(bodies)
     check(gb.spark.fleet(cooling(), frame, batches=6, **SAID).toPandas(), expected)
+    both = gb.spark.fleet(cooling(), frame, batches=2, **SAID).select(functions.spark_partition_id())
+    assert both.distinct().count() == 2, "each batch has a task of its own"
     whole = frame.repartition(3, "which")
     check(gb.spark.fleet(cooling(), whole, whole=True, **SAID).toPandas(), expected)
     with pytest.raises(gb.Error, match="there is no column `Room`"):
@@ -175,5 +181,50 @@ def test_dask_with_a_worker_killed(
 
     monkeypatch.setattr(adapter, "_fit", killing)
     found = gb.dask.fleet(cooling(), dd.from_pandas(bodies, npartitions=4), **SAID).compute()
+    assert os.path.exists(mark)
+    check(found, expected)
+
+
+@pytest.fixture(scope="module")
+def ray() -> Iterator[Any]:
+    ray = pytest.importorskip("ray")
+    pytest.importorskip("ray.data")
+    # Workers find the tests' modules by the path of this process.
+    ray.init(num_cpus=2, include_dashboard=False, logging_level="ERROR", log_to_driver=False, runtime_env={"env_vars": {"PYTHONPATH": ":".join(sys.path)}})
+    context = ray.data.DataContext.get_current()
+    context.enable_progress_bars = False
+    # So small that the samples of a record would lie in several blocks if blocks were cut.
+    context.target_max_block_size = 2_000
+    yield ray
+    ray.shutdown()
+
+
+def test_whole_blocks_on_ray(ray: Any, bodies: pd.DataFrame, zoned: pd.DataFrame, expected: pd.DataFrame) -> None:
+    frame = ray.data.from_pandas(bodies)
+    check(gb.ray.fleet(cooling(), frame, whole=True, **SAID).to_pandas(), expected)
+    check_zoned(gb.ray.fleet(cooling(), ray.data.from_pandas(zoned), whole=True, **SAID).to_pandas(), expected)
+    with pytest.raises(gb.Error, match="there is no column `Room`"):
+        gb.ray.fleet(cooling(), frame, columns={"room": "Room"}, **SAID)
+    with pytest.raises(gb.Error, match="no column `t` or `time`"):
+        gb.ray.fleet(cooling(), frame.drop_columns(["t"]), **SAID)
+
+
+def test_ray_with_a_worker_killed(
+    ray: Any, bodies: pd.DataFrame, expected: pd.DataFrame, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from greybox import ray as adapter
+
+    mark, fit = str(tmp_path / "killed"), adapter._fit
+
+    def killing(part: Any, made: Any) -> Any:
+        try:
+            os.close(os.open(mark, os.O_CREAT | os.O_EXCL))
+        except FileExistsError:
+            return fit(part, made)
+        os.kill(os.getpid(), signal.SIGKILL)
+        return None
+
+    monkeypatch.setattr(adapter, "_fit", killing)
+    found = gb.ray.fleet(cooling(), ray.data.from_pandas(bodies), blocks=3, **SAID).to_pandas()
     assert os.path.exists(mark)
     check(found, expected)

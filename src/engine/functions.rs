@@ -99,14 +99,21 @@ fn exp<W: Wide>(x: W) -> W {
     polynomial(r, &SERIES).scale2(n)
 }
 
+/// Beyond, the hyperbolic tangent rounds to one: it lacks less than `2 exp(-40)`, 8.5e-18.
+const SATURATED: f64 = 20.0;
+
 /// A quotient of polynomials near zero (S. L. Moshier, Cephes Mathematical Library, 1989), beyond by the exponential.
 #[inline(always)]
 fn tanh<W: Wide>(x: W) -> W {
     const ABOVE: [f64; 3] = [-1.614_687_684_417_084_6e3, -9.928_772_310_019_185e1, -9.643_991_794_250_523e-1];
     const BELOW: [f64; 4] = [4.844_063_053_251_255e3, 2.235_488_390_601_004_5e3, 1.128_116_784_916_329_3e2, 1.0];
+    let (one, size) = (W::splat(1.0), x.abs());
+    // As dry friction is mostly; the exponential would give the same bits.
+    if size.neg().all_below(-SATURATED) {
+        return one.copysign(x);
+    }
     let square = x.mul(x);
     let near = x.mul(square).mul_add(polynomial(square, &ABOVE).div(polynomial(square, &BELOW)), x);
-    let (one, size) = (W::splat(1.0), x.abs());
     let far = one.sub(W::splat(2.0).div(exp(size.add(size)).add(one)));
     size.select_lt(W::splat(0.625), near, far).copysign(x)
 }
@@ -185,6 +192,24 @@ mod tests {
     fn arguments() -> Vec<f64> {
         let mut all = vec![0.0, -0.0, f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e-310, -5e-324, 1e308];
         all.extend([709.7, 709.79, 710.5, -708.0, -745.0, -745.2, -800.0, 0.625]);
+        all.extend([
+            -SATURATED,
+            19.06,
+            19.07,
+            SATURATED,
+            -20.1,
+            20.1,
+            21.0,
+            f64::NAN,
+            20.5,
+            30.0,
+            -25.0,
+            22.0,
+            23.0,
+            24.0,
+            26.0,
+            27.0,
+        ]);
         all.extend((-40_000..40_000).map(|i| f64::from(i) * 0.00171));
         all.extend((-4_000..4_000).map(|i| f64::from(i) * 0.1713));
         all.extend((-4_000..4_000).map(|i| f64::from(i) * 311.7));

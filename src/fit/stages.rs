@@ -9,6 +9,7 @@ use super::moves::{LEAST_NOISE, Movement, Moves, NEAR, UNEXPLAINED};
 use super::refine::Start;
 use super::search::search;
 use super::shooting::{Shot, shoot};
+use super::slower::slower;
 use crate::numeral::counted;
 use crate::predict::{GivenNoise, Guess};
 use crate::problem::{Control, Lead, Noise, Problem, Settings, noise};
@@ -31,6 +32,8 @@ const MOST_STATES: usize = 6;
 
 /// What the stages are, in words.
 const STAGES: &str = "predictions by a filter that corrects the state at each sample, less in each stage";
+const SLOWER: &str =
+    "parameters in other proportions, since a state decays in a small part of a sample at the declared start";
 const NO_NEARER: &str = "their end is no nearer to the measurements than the declared start";
 
 /// The stages of a problem.
@@ -50,6 +53,8 @@ pub(super) struct Led {
     pub evaluations: u64,
     /// Whether a simulation from their end follows the measurements as well as the predictions do.
     pub follows: bool,
+    /// Whether they began at a slower start than the declared one.
+    pub slower: bool,
 }
 
 impl Led {
@@ -61,11 +66,12 @@ impl Led {
     /// The path, in words.
     pub fn path(&self) -> String {
         let stages = || format!("{} ({STAGES})", counted(self.stages.into(), "stage"));
-        match &self.shot {
+        let path = match &self.shot {
             None => stages(),
             Some(shot) if self.stages == 0 => shot.to_string(),
             Some(shot) => format!("{}, then of {shot}", stages()),
-        }
+        };
+        if self.slower { format!("{path}, from {SLOWER}") } else { path }
     }
 }
 
@@ -288,8 +294,30 @@ impl Stages<'_> {
     /// The end of stages from the declared start.
     pub fn declared(&self, control: &Control) -> Result<(Start, Led), &'static str> {
         let declared = Start::declared(self.problem);
-        let (coordinates, led) = self.lead(&declared.coordinates, control)?;
+        let (coordinates, led) = self.lead_or_slower(&declared.coordinates, control)?;
         Ok((Start { coordinates, stages: Some(led.clone()), ..declared }, led))
+    }
+
+    /// Where a start is led, or where it does not lead to the measurements a slower one, if that end is nearer to them.
+    ///
+    /// # Errors
+    /// As [`lead`](Self::lead).
+    fn lead_or_slower(&self, start: &[f64], control: &Control) -> Result<(Vec<f64>, Led), &'static str> {
+        let found = self.lead(start, control);
+        if found.as_ref().is_ok_and(|(_, led)| led.follows || led.explains()) || control.stops() {
+            return found;
+        }
+        let Some(slower) = slower(self.problem, self.movement.step, start) else { return found };
+        let Ok((end, led)) = self.lead(&slower, control) else { return found };
+        let (nearest, before) = match &found {
+            Ok((end, led)) => (self.distance(end), led.evaluations),
+            Err(_) => (f64::INFINITY, 0),
+        };
+        let evaluations = before + led.evaluations;
+        match found {
+            Ok((found, own)) if self.distance(&end) >= nearest => Ok((found, Led { evaluations, ..own })),
+            _ => Ok((end, Led { evaluations, slower: true, ..led })),
+        }
     }
 }
 

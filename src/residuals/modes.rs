@@ -1,6 +1,6 @@
 //! Eigenvalues of the model about some points along the records.
 
-use crate::problem::Objective;
+use crate::problem::{Objective, Role};
 use crate::record::Record;
 use crate::transition::Transition;
 use nalgebra::{Complex, DMatrix, Schur};
@@ -10,6 +10,12 @@ use nalgebra::{Complex, DMatrix, Schur};
 const POINTS: usize = 8;
 const STATES: usize = 300;
 const ITERATIONS: usize = 10_000;
+
+/// Relative change of a parameter for a slope.
+const CHANGE: f64 = 1e-4;
+/// Steps of the change of unknowns towards another number, and how far off it may be at their end (relative).
+const STEPS: usize = 50;
+const ARRIVED: f64 = 1e-3;
 
 /// The state at a sample of an experiment.
 pub(crate) struct StateAt {
@@ -87,6 +93,64 @@ fn eigenvalues_of(n: usize, slopes: &[f64]) -> Option<Vec<Complex<f64>>> {
     Some(schur.complex_eigenvalues().iter().copied().collect())
 }
 
+/// By which part of itself a number grows where an unknown grows by a part of itself, for each at a point of an experiment: `of` gives the number over that at
+/// the point. Initial states, and what another experiment has of its own, do not count.
+pub(crate) fn relative_slopes(
+    objective: &Objective<'_>,
+    (experiment, coordinates): (usize, &[f64]),
+    of: &dyn Fn(&[f64]) -> Option<f64>,
+) -> Option<Vec<f64>> {
+    let unknowns = &objective.problem.unknowns;
+    let slope = |(i, value): (usize, f64)| {
+        let unknown = &unknowns.row[i];
+        if matches!(unknown.role, Role::InitialState(_)) || unknown.experiment.is_some_and(|e| e != experiment) {
+            return Some(0.0);
+        }
+        let mut changed = coordinates.to_vec();
+        changed[i] = unknown.parameter.transform.to_coordinate(value * (1.0 + CHANGE));
+        Some(of(&changed)?.ln() / CHANGE)
+    };
+    unknowns.values(coordinates).into_iter().enumerate().map(slope).collect()
+}
+
+/// Changes some unknowns, all by the least parts of themselves, until a number at a point of an experiment is another one; `None` if they come to their
+/// bounds, or to where they do not move it. `of` gives the number of kind `N` at a point, where it was the second argument near it; `needed` the
+/// logarithm by which it has to grow, `largest` how much of it is tried at once.
+pub(crate) fn reached<N: Copy>(
+    objective: &Objective<'_>,
+    (experiment, coordinates): (usize, &[f64]),
+    moving: &[usize],
+    (near, largest): (N, f64),
+    of: &dyn Fn(&[f64], N) -> Option<N>,
+    needed: impl Fn(N) -> f64,
+) -> Option<Vec<f64>> {
+    let (unknowns, mut x) = (&objective.problem.unknowns, coordinates.to_vec());
+    let bounds = unknowns.bounds();
+    let mut here = of(&x, near)?;
+    for _ in 0..STEPS {
+        let lacks = needed(here);
+        if lacks.abs() < ARRIVED {
+            return Some(x);
+        }
+        let grown = |x: &[f64]| Some((lacks - needed(of(x, here)?)).exp());
+        let slopes = relative_slopes(objective, (experiment, &x), &grown)?;
+        let slopes: Vec<f64> = moving.iter().map(|&i| slopes[i]).collect();
+        let (steps, values) = (least(&slopes, lacks.clamp(-largest, largest))?, unknowns.values(&x));
+        for (&i, step) in moving.iter().zip(steps) {
+            let (changed, (lower, upper)) = (values[i] * step.exp(), bounds[i]);
+            x[i] = unknowns.row[i].parameter.transform.to_coordinate(changed).max(lower).min(upper);
+        }
+        here = of(&x, here)?;
+    }
+    None
+}
+
+/// The least changes that change by so much what has these slopes; `None` without a slope.
+fn least(slopes: &[f64], needed: f64) -> Option<Vec<f64>> {
+    let squares: f64 = slopes.iter().map(|slope| slope * slope).sum();
+    (squares > 0.0).then(|| slopes.iter().map(|slope| slope * needed / squares).collect())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -145,5 +209,11 @@ mod tests {
             let largest = eigenvalues_of(n, &matrix).unwrap().iter().map(|value| value.im).fold(0.0, f64::max);
             assert!(largest <= imaginary_bound(n, &matrix), "{n}: {largest}");
         }
+    }
+
+    #[test]
+    fn changes_are_the_least() {
+        assert_eq!(least(&[3.0, -4.0], 0.5), Some(vec![0.06, -0.08]));
+        assert_eq!([least(&[0.0, 0.0], 0.5), least(&[], 0.5)], [None, None]);
     }
 }

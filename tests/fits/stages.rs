@@ -87,6 +87,20 @@ fn a_start_that_cannot_be_simulated_is_led_to_the_data() {
     }
 }
 
+/// From a start at which the speed decays ten million times in a second, 50,000 times in a sample, stages alone lead nowhere: a step of
+/// Runge and Kutta explodes. In other proportions (mass and friction moved by equal parts) they lead to the minimum.
+#[test]
+fn a_start_that_is_too_fast_is_slowed() {
+    let start = Axis { m: free(0.01).log(), fv: free(1e5).log(), offset: free(0.0) };
+    let found = Fit::new(&Pushed, &pushed(1e-3)).parameters(start).staged().run().unwrap();
+    for (unknown, truth) in found.unknowns.iter().zip([95.0, 200.0, -3.0]) {
+        let error = unknown.knowledge.standard_error().unwrap();
+        assert!((unknown.value - truth).abs() < 4.0 * error && error < 0.05 * truth.abs(), "{found}");
+    }
+    let told = found.warnings.iter().filter(|warning| warning.code == WarningCode::Staged);
+    assert!(told.map(|warning| &warning.text).any(|text| text.contains("in other proportions")), "{found}");
+}
+
 /// Where a fit is stopped, resumed or watched, and where outputs are missing or do not move, a start that cannot be simulated is led all the same.
 #[test]
 fn stages_hold_with_other_settings() {

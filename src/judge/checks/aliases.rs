@@ -5,7 +5,7 @@
 
 use super::*;
 use crate::record::{Record, Time, steps};
-use crate::residuals::modes::{StateAt, eigenvalues, oscillating, some};
+use crate::residuals::modes::{StateAt, eigenvalues, oscillating, reached, relative_slopes, some};
 use crate::residuals::residual_pass;
 use nalgebra::Complex;
 use std::f64::consts::{PI, TAU};
@@ -28,17 +28,12 @@ const SAMPLES: f64 = 2.5;
 const LEFT: f64 = 0.1;
 /// Factor within which unknowns may be off where no bound is nearer: that within which `Fit::starts` draws.
 const REACH: f64 = 10.0;
-/// Relative change of a parameter for the slope of a frequency.
-const CHANGE: f64 = 1e-4;
+/// The largest relative change of a frequency at once.
+const LARGEST_STEP: f64 = 0.1;
 /// Number of steps of time that are examined.
 const STEPS: usize = 1000;
 /// Sampling is uneven where the quartiles of its steps of time differ by more than this part of the median.
 const EVEN: f64 = 0.1;
-
-/// Steps of the change of unknowns towards another frequency, the largest of each, and how far off they may end (all relative).
-const STEPS_TO_ALIAS: usize = 50;
-const LARGEST_STEP: f64 = 0.1;
-const ARRIVED: f64 = 1e-3;
 
 /// Decay (negative, 1/s) and frequency (rad/s).
 type Mode = (f64, f64);
@@ -167,17 +162,8 @@ fn moved_within(slope: f64, value: f64, needed: f64, (lower, upper): (f64, f64))
 
 /// By which part of itself the frequency of an oscillation grows where an unknown grows by a part of itself, for each.
 fn slopes(objective: &Objective<'_>, coordinates: &[f64], point: &StateAt, mode: Mode) -> Option<Vec<f64>> {
-    let unknowns = &objective.problem.unknowns;
-    let slope = |(i, value): (usize, f64)| {
-        let unknown = &unknowns.row[i];
-        if matches!(unknown.role, Role::InitialState(_)) || unknown.experiment.is_some_and(|e| e != point.experiment) {
-            return Some(0.0);
-        }
-        let mut changed = coordinates.to_vec();
-        changed[i] = unknown.parameter.transform.to_coordinate(value * (1.0 + CHANGE));
-        Some((nearest(&modes(objective, &changed, point)?, mode).1 / mode.1).ln() / CHANGE)
-    };
-    unknowns.values(coordinates).into_iter().enumerate().map(slope).collect()
+    let frequency = |x: &[f64]| Some(nearest(&modes(objective, x, point)?, mode).1 / mode.1);
+    relative_slopes(objective, (point.experiment, coordinates), &frequency)
 }
 
 /// Changes some unknowns, all by the least parts of themselves, until an oscillation has another frequency; `None` if they come to
@@ -189,30 +175,10 @@ fn moved(
     frequency: f64,
     moving: &[usize],
 ) -> Option<Vec<f64>> {
-    let (unknowns, mut x) = (&objective.problem.unknowns, coordinates.to_vec());
-    let bounds = unknowns.bounds();
-    let mut mode = nearest(&modes(objective, &x, point)?, mode);
-    for _ in 0..STEPS_TO_ALIAS {
-        let needed = (frequency / mode.1).ln();
-        if needed.abs() < ARRIVED {
-            return Some(x);
-        }
-        let slopes = slopes(objective, &x, point, mode)?;
-        let slopes: Vec<f64> = moving.iter().map(|&i| slopes[i]).collect();
-        let (steps, values) = (least(&slopes, needed.clamp(-LARGEST_STEP, LARGEST_STEP))?, unknowns.values(&x));
-        for (&i, step) in moving.iter().zip(steps) {
-            let (changed, (lower, upper)) = (values[i] * step.exp(), bounds[i]);
-            x[i] = unknowns.row[i].parameter.transform.to_coordinate(changed).max(lower).min(upper);
-        }
-        mode = nearest(&modes(objective, &x, point)?, mode);
-    }
-    None
-}
-
-/// The least changes that change by so much what has these slopes; `None` without a slope.
-fn least(slopes: &[f64], needed: f64) -> Option<Vec<f64>> {
-    let squares: f64 = slopes.iter().map(|slope| slope * slope).sum();
-    (squares > 0.0).then(|| slopes.iter().map(|slope| slope * needed / squares).collect())
+    let of = |x: &[f64], near: Mode| Some(nearest(&modes(objective, x, point)?, near));
+    reached(objective, (point.experiment, coordinates), moving, (mode, LARGEST_STEP), &of, |mode| {
+        (frequency / mode.1).ln()
+    })
 }
 
 /// Each oscillation about a point.
@@ -304,13 +270,6 @@ mod tests {
         for (found, expected) in found.into_iter().zip(expected) {
             assert!((found / expected - 1.0f64).abs() < 1e-14, "{found} {expected}");
         }
-    }
-
-    /// The least changes have the direction of the slopes, `3^2 + 4^2 = 5^2`.
-    #[test]
-    fn the_least_changes() {
-        assert_eq!(least(&[3.0, -4.0], 0.5), Some(vec![0.06, -0.08]));
-        assert_eq!([least(&[0.0, 0.0], 0.5), least(&[], 0.5)], [None, None]);
     }
 
     /// Of ten samples a second an oscillation of more than 4 cycles a second has fewer than two and a half; a tenth is left of it
