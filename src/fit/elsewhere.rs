@@ -81,6 +81,14 @@ impl Further {
         }
     }
 
+    /// What led to where the searches began, if stages did.
+    pub fn led(&self) -> Option<&Led> {
+        match self {
+            Further::Found { way: Way::Stages(led), .. } => Some(led),
+            _ => None,
+        }
+    }
+
     /// The better one of the best minimum and an estimate that has the work of these searches, with a note.
     fn or(&self, found: &Summary) -> Summary {
         let (mut best, text) = match self {
@@ -228,7 +236,10 @@ impl Problem<'_> {
         }
         let is_usable = |best: &Summary| best.severity() < Severity::NotUsable;
         let suffices = |best: &Summary| is_usable(best) || !leaves_unexplained(best) && self.is_near_noise(best);
-        if control.stops() || staged.as_ref().is_some_and(|(best, _)| suffices(best)) {
+        // Pieces that are explained have the right parameters, though no simulation follows the record.
+        let are_led =
+            |(best, way): &(Summary, Way)| suffices(best) || matches!(way, Way::Stages(led) if led.explains());
+        if control.stops() || staged.as_ref().is_some_and(are_led) {
             return staged.map(further);
         }
         let again = self.searched_from_starts(trials, begin, control).map(|best| (best, Way::Starts));

@@ -50,7 +50,8 @@ impl Problem<'_> {
             true => found,
             false => self.searched_elsewhere(&found, further.as_ref(), &control).unwrap_or(found),
         };
-        Ok(noted(self.or_by_pieces(found, led.as_ref(), &control), note))
+        let led = led.as_ref().or(further.as_ref().and_then(|further| further.led()));
+        Ok(noted(self.or_by_pieces(found, led, &control), note))
     }
 
     /// The estimate from the declared start, or from the end of stages if they were asked for, with a note of these.

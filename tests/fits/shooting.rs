@@ -88,12 +88,17 @@ fn a_record_that_no_simulation_follows_is_fitted_in_pieces() {
 }
 
 /// In stages: where the filter's predictions have led the parameters near, and no simulation follows, multiple shooting goes on, and the path has both.
+/// So it is where the fit goes in stages by itself.
 #[test]
 fn stages_end_with_multiple_shooting() {
     let record = lorenz(60);
-    let found = Fit::new(&Lorenz, &record).parameters(off()).integrator(STEPS).staged().run().unwrap();
-    assert!((found.parameters.rho / 28.0 - 1.0).abs() < 2e-3, "{found}");
-    assert!(said(&found).contains("less in each stage), then of multiple shooting ("), "{found}");
+    let fit = || Fit::new(&Lorenz, &record).parameters(off()).integrator(STEPS);
+    let (asked, by_itself) = (fit().staged().run().unwrap(), fit().run().unwrap());
+    for found in [&asked, &by_itself] {
+        assert!((found.parameters.rho / 28.0 - 1.0).abs() < 2e-3, "{found}");
+        assert!(said(found).contains("with an initial state each"), "{found}");
+    }
+    assert!(said(&asked).contains("less in each stage), then of multiple shooting ("), "{asked}");
 }
 
 /// Weights have no unit: the same parameters come of them, and the same error in units of the noise, 0.9 to 1.2 of it.
