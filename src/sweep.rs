@@ -297,8 +297,8 @@ pub trait Sweep: Send + Sync {
         None
     }
 
-    /// Which inputs have a dead time; empty if none can have one.
-    fn late(&self, parameters: &[f64]) -> Vec<bool> {
+    /// The dead time of each input that has one (s); empty if none has.
+    fn late(&self, parameters: &[f64]) -> Vec<Option<f64>> {
         let _ = parameters;
         vec![]
     }

@@ -71,7 +71,10 @@ def fleet(
     if given.get("sample_time") is not None:
         raise Error("a shuffle does not keep the order of samples, which sample_time needs; add a column of the time")
     made = plan(model, by, parameters, Record(None, None, time, None, columns, hold, initial), given)
-    names = dataset.schema().names
+    schema = dataset.schema()
+    if schema is None:
+        raise Error("the dataset has no rows")
+    names = schema.names
     missing = [name for name in made.needed() if name not in names]
     if missing:
         raise Error(f"there is no column `{missing[0]}`; the dataset has: {near(missing[0], names)}")

@@ -19,7 +19,7 @@ const TRIALS: u64 = 200;
 /// the others searched. At the minimum that is found, the cost has to fall towards the kink from both sides. `None` where it is none.
 pub(super) fn at_kink(objective: &Objective<'_>, round: &Round) -> Option<Round> {
     let values = objective.values_of(0, &round.coordinates);
-    if !objective.sweep.late(&values.p).contains(&true) {
+    if objective.sweep.late(&values.p).is_empty() {
         return None;
     }
     let mut round = round.clone();

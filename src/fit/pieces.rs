@@ -38,7 +38,7 @@ impl Problem<'_> {
             .any(|unknown| matches!(unknown.role, Role::Parameter(_)) && unknown.experiment.is_some());
         // A late input takes values from before the piece, which a slice of the record does not have.
         let parameters: Vec<f64> = self.unknowns.parameters.iter().map(|parameter| parameter.start).collect();
-        if self.sweep.late(&parameters).contains(&true) {
+        if !self.sweep.late(&parameters).is_empty() {
             return None;
         }
         let (shot, begin) = (led.shot.as_ref()?, Instant::now());

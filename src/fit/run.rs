@@ -10,7 +10,7 @@ use super::start_error::start_error;
 use super::starts::search_from_many;
 use crate::covariance::SearchEnd;
 use crate::error::Error;
-use crate::estimate::{Summary, Warning};
+use crate::estimate::Summary;
 use crate::judge::conclude;
 use crate::optimize::{Domain, LeastSquares, LevenbergMarquardt, Outcome};
 use crate::problem::{Control, Lead, Objective, Problem, SearchPlan, Settings, Simulated, Whitening, noise};
@@ -35,7 +35,7 @@ impl Problem<'_> {
     /// cannot be simulated, is followed by finer ones.
     pub(super) fn run_since(&self, begin: Instant) -> Result<Summary, Error> {
         let control = self.control(begin);
-        let (found, led, note) = self.run_first(begin, &control);
+        let (found, led) = self.run_first(begin, &control);
         // Before finer methods, each of which takes several times as long.
         let explained = led.as_ref().is_some_and(Led::explains);
         let further = found.as_ref().ok().filter(|_| !explained);
@@ -51,16 +51,16 @@ impl Problem<'_> {
             false => self.searched_elsewhere(&found, further.as_ref(), &control).unwrap_or(found),
         };
         let led = led.as_ref().or(further.as_ref().and_then(|further| further.led()));
-        Ok(noted(self.or_by_pieces(found, led, &control), note))
+        Ok(self.or_by_pieces(found, led, &control))
     }
 
-    /// The estimate from the declared start, or from the end of stages if they were asked for, with a note of these.
-    fn run_first(&self, begin: Instant, control: &Control) -> (Result<Summary, Error>, Option<Led>, Option<Warning>) {
+    /// The estimate from the declared start, or from the end of stages if they were asked for.
+    fn run_first(&self, begin: Instant, control: &Control) -> (Result<Summary, Error>, Option<Led>) {
         let (start, note) = self.first_start(control);
         let led = start.stages.clone();
         let found = self.run_from(start, begin, control);
         let found = found.map(|found| self.shot_further(&found, led.as_ref(), control).unwrap_or(found));
-        (found, led, note)
+        (found.map(|found| noted(found, note)), led)
     }
 
     fn run_from(&self, start: Start, begin: Instant, control: &Control) -> Result<Summary, Error> {

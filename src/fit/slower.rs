@@ -1,33 +1,37 @@
 //! Starts from which a state decays within a small part of a sample.
 //!
-//! Simulations and predictions from there have hardly a slope, and those by an explicit method grow without bound. What decays so fast does
-//! not show in the measurements: the start is no better than one with the same parameters in other proportions.
+//! Simulations and predictions from there have hardly a slope, and those by an explicit method grow without bound. The measurements do not show what
+//! decays so fast.
 
+use super::moves::Movement;
 use crate::layout::Kind;
 use crate::problem::{Control, Problem};
 use crate::residuals::modes::{StateAt, eigenvalues, reached};
 
-/// A start is too fast where its fastest rate times the interval between samples is more than this: beyond 2.8 Runge and Kutta's step grows.
+/// A start is too fast where its fastest decay times the interval between samples is more than this: beyond 2.8 a step of Runge and Kutta grows.
 const FAST: f64 = 3.0;
-/// The most by which the logarithm of the rate is changed at once.
+/// The most by which the logarithm of the decay is changed at once.
 const LARGEST_STEP: f64 = 2.0;
 
-/// The start with its parameters changed, all by the least parts of themselves, until the fastest rate of the state at the first sample is that of
-/// the samples; `None` where it is not much faster, and where the parameters' bounds do not allow it. `interval` is that between samples (s).
-pub(super) fn slower(problem: &Problem<'_>, interval: f64, start: &[f64]) -> Option<Vec<f64>> {
+/// The start with its parameters changed, all by the least parts of themselves, until the fastest decay of the state at the first sample of the record
+/// that moves the most is one per sample; `None` where it is not much faster, where the parameters' bounds do not allow it, and where `control` stops.
+pub(super) fn slower(problem: &Problem<'_>, movement: &Movement, start: &[f64], control: &Control) -> Option<Vec<f64>> {
     if problem.layout().kind != Kind::Continuous {
         return None;
     }
-    let never = Control::NEVER;
-    let objective = problem.in_units(&never);
-    let at = StateAt { experiment: 0, sample: 0, state: objective.values_of(0, start).x };
+    let objective = problem.in_units(control);
+    let experiment = movement.most;
+    let at = StateAt { experiment, sample: 0, state: objective.values_of(experiment, start).x };
     let fastest = |x: &[f64]| {
-        let rates = eigenvalues(&objective, x, &at)?.into_iter().map(|rate| rate.norm());
-        rates.reduce(f64::max).map(|rate| rate * interval)
+        if control.stops() {
+            return None;
+        }
+        let decays = eigenvalues(&objective, x, &at)?.into_iter().map(|rate| -rate.re);
+        decays.reduce(f64::max).map(|decay| decay * movement.step)
     };
-    let rate = fastest(start).filter(|rate| *rate > FAST)?;
+    let decay = fastest(start).filter(|decay| *decay > FAST)?;
     let all: Vec<usize> = (0..start.len()).collect();
-    reached(&objective, (0, start), &all, (rate, LARGEST_STEP), &|x, _| fastest(x), |rate: f64| -rate.ln())
+    reached(&objective, (experiment, start), &all, (decay, LARGEST_STEP), &|x, _| fastest(x), |decay: f64| -decay.ln())
 }
 
 #[cfg(test)]
@@ -62,12 +66,15 @@ mod tests {
         let record = Experiment::new(&Coil, Time::Uniform { start: 0.0, step: 0.1 }, inputs, outputs).unwrap();
         let moved = |a: crate::Parameter| {
             let problem = Fit::new(&Coil, &record).parameters(Gain { a }).problem().unwrap();
-            slower(&problem, 0.1, &problem.unknowns.start()).map(|x| problem.unknowns.values(&x)[0])
+            let movement = problem.movement().unwrap();
+            let found = slower(&problem, &movement, &problem.unknowns.start(), &Control::NEVER);
+            found.map(|x| problem.unknowns.values(&x)[0])
         };
-        for a in [free(1e6), free(1e6).log(), free(-1e6)] {
+        for a in [free(1e6), free(1e6).log()] {
             let found = moved(a).unwrap();
-            assert!((found.abs() / 10.0 - 1.0).abs() < 2e-3 && found * a.start > 0.0, "{found}");
+            assert!((found / 10.0 - 1.0).abs() < 2e-3, "{found}");
         }
-        assert_eq!([moved(free(20.0)), moved(free(1e6).within(1e3, 1e7))], [None, None]);
+        // What grows is none of them.
+        assert_eq!([free(20.0), free(-1e6), free(1e6).within(1e3, 1e7)].map(moved), [None; 3]);
     }
 }

@@ -33,7 +33,7 @@ const MOST_STATES: usize = 6;
 /// What the stages are, in words.
 const STAGES: &str = "predictions by a filter that corrects the state at each sample, less in each stage";
 const SLOWER: &str =
-    "parameters in other proportions, since a state decays in a small part of a sample at the declared start";
+    "parameters changed so that no state decays in less than a sample, as one does at the declared start";
 const NO_NEARER: &str = "their end is no nearer to the measurements than the declared start";
 
 /// The stages of a problem.
@@ -298,25 +298,24 @@ impl Stages<'_> {
         Ok((Start { coordinates, stages: Some(led.clone()), ..declared }, led))
     }
 
-    /// Where a start is led, or where it does not lead to the measurements a slower one, if that end is nearer to them.
+    /// Where a start is led; where a simulation from it explains nothing and stages do not lead it to the measurements, where a slower one is led, if
+    /// pieces from there are explained, or if a simulation is nearer to the measurements.
     ///
     /// # Errors
     /// As [`lead`](Self::lead).
     fn lead_or_slower(&self, start: &[f64], control: &Control) -> Result<(Vec<f64>, Led), &'static str> {
         let found = self.lead(start, control);
-        if found.as_ref().is_ok_and(|(_, led)| led.follows || led.explains()) || control.stops() {
+        let is_led = found.as_ref().is_ok_and(|(_, led)| led.follows || led.explains());
+        if self.alone || is_led || self.problem.start_explains(control) == Some(true) || control.stops() {
             return found;
         }
-        let Some(slower) = slower(self.problem, self.movement.step, start) else { return found };
+        let Some(slower) = slower(self.problem, &self.movement, start, control) else { return found };
         let Ok((end, led)) = self.lead(&slower, control) else { return found };
-        let (nearest, before) = match &found {
-            Ok((end, led)) => (self.distance(end), led.evaluations),
-            Err(_) => (f64::INFINITY, 0),
-        };
-        let evaluations = before + led.evaluations;
-        match found {
-            Ok((found, own)) if self.distance(&end) >= nearest => Ok((found, Led { evaluations, ..own })),
-            _ => Ok((end, Led { evaluations, slower: true, ..led })),
+        let nearest = self.distance(found.as_ref().map_or(start, |(end, _)| end));
+        let evaluations = led.evaluations + found.as_ref().map_or(0, |(_, led)| led.evaluations);
+        match led.explains() || self.distance(&end) < nearest {
+            true => Ok((end, Led { evaluations, slower: true, ..led })),
+            false => found.map(|(end, led)| (end, Led { evaluations, ..led })),
         }
     }
 }

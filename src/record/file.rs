@@ -74,7 +74,7 @@ use std::path::{Path, PathBuf};
 /// ```
 ///
 /// **Columns** go by name. Each input and output of the model has a column of its own name, with a unit behind it or without
-/// (`ud [V]`), unless [`column`](DataFile::column) says another. States need none; further columns are ignored. A value is
+/// (`ud [V]`, `ud / V`), unless [`column`](DataFile::column) says another. States need none; further columns are ignored. A value is
 /// `factor * cell + offset`, in the unit of the signal. Where the file says a unit that is known and not the signal's (rpm for rad/s, mA for
 /// A), it is refused until a [`unit`](DataFile::unit) or a [`factor`](DataFile::factor) is given; nothing is converted unasked.
 ///

@@ -29,7 +29,10 @@ pub(crate) fn some(points: &[StateAt]) -> impl Iterator<Item = &StateAt> {
     let states = points.first().map_or(0, |point| point.state.len());
     let fewer = (states as f64 / STATES as f64).powi(3).max(1.0);
     let examined = ((POINTS as f64 / fewer) as usize).max(1);
-    points.iter().step_by(points.len().div_ceil(examined).max(1))
+    let step = points.len().div_ceil(examined).max(1);
+    // Of few points not the first ones, where a record may be at rest.
+    let first = if examined < POINTS { step / 2 } else { 0 };
+    points.iter().skip(first).step_by(step)
 }
 
 /// The eigenvalues of the state's Jacobian at a point (1/s).
@@ -136,9 +139,13 @@ pub(crate) fn reached<N: Copy>(
         let slopes = relative_slopes(objective, (experiment, &x), &grown)?;
         let slopes: Vec<f64> = moving.iter().map(|&i| slopes[i]).collect();
         let (steps, values) = (least(&slopes, lacks.clamp(-largest, largest))?, unknowns.values(&x));
+        let before = x.clone();
         for (&i, step) in moving.iter().zip(steps) {
             let (changed, (lower, upper)) = (values[i] * step.exp(), bounds[i]);
             x[i] = unknowns.row[i].parameter.transform.to_coordinate(changed).max(lower).min(upper);
+        }
+        if x == before {
+            return None;
         }
         here = of(&x, here)?;
     }

@@ -186,8 +186,8 @@ impl Sweep for DualSweep<'_> {
         self.place(t, &u, p).jump_slopes(state)
     }
 
-    fn late(&self, parameters: &[f64]) -> Vec<bool> {
-        self.code.late(parameters)
+    fn late(&self, parameters: &[f64]) -> Vec<Option<f64>> {
+        delays(self.code.values(), &self.code.late(parameters), parameters)
     }
 
     fn locate(

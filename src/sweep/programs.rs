@@ -308,7 +308,7 @@ impl Sweep for ProgramSweep<'_> {
         self.plain.jump_slopes(record, sample, state, p)
     }
 
-    fn late(&self, parameters: &[f64]) -> Vec<bool> {
+    fn late(&self, parameters: &[f64]) -> Vec<Option<f64>> {
         self.plain.late(parameters)
     }
 

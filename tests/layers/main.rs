@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 /// Row by row, the lowest first, the layer and its modules. Each may import from all earlier rows, and from nothing else.
 const LAYERS: &[(&str, &[&str])] = &[
     ("vector registers", &["aligned", "lanes", "wide"]),
-    ("numbers", &["scalar", "units", "random", "numeral", "whiteness", "real", "format"]),
+    ("numbers", &["scalar", "units", "random", "numeral", "whiteness", "real", "format", "hash"]),
     ("numbers: with slopes, in vectors; units", &["dual", "fused", "signals", "unit"]),
     ("numbers: graphs, triangles", &["information", "error", "by_name", "layout", "graph", "moments"]),
     ("numbers: linear equations over an interval", &["transition"]),

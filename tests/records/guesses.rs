@@ -220,6 +220,10 @@ fn units_behind_a_bar_and_times_behind_a_space() {
         let said = record.record().reading().unwrap().to_string();
         assert_eq!(said, format!("cells between \";\", time \"{time}\" in {shown}"));
     }
+    // A column without a bar is preferred, and one that is named in full has no unit by its bar.
+    let path = file("barred", "t [s],t / ms,ud [V],ud/mV,w,id m/s,A/F,Time / h\n0,7,1,9,2,3,4,0\n0.5,8,1,9,2,3,4,0\n");
+    let record = DataFile::new(path).column("id", "id m/s").column("iq", "A/F").read(&Pmsm).unwrap();
+    assert_eq!((record.time(1), record.input(1).ud, record.output(1).id, record.output(1).iq), (0.5, 1.0, 3.0, 4.0));
     // What is no unit stays part of the name.
     let path = file("ratios", "t,ud/uq,w,id,iq\n0,1,2,3,4\n1,1,2,3,4\n");
     says(DataFile::new(path).read(&Pmsm), &["no column `ud`", "ud/uq"]);

@@ -6,7 +6,7 @@ use crate::record::Record;
 
 pub(crate) const COPIES: Check = Check::new(
     "no column is a copy",
-    "Is an input or an output another column sample by sample, in all records? Inputs with a dead time do not count.",
+    "Is an input or an output another column sample by sample, in all records? Inputs of different dead times do not count.",
     &[WarningCode::IdenticalColumns],
     |evidence, _| copies(evidence).into(),
 );
@@ -38,8 +38,9 @@ fn copies(evidence: &Evidence<'_>) -> Vec<Warning> {
     let same = |a: usize, b: usize| are_same(records.iter().map(|record| (column(record, a), column(record, b))));
     let parameters = evidence.point.objective.values_of(0, &evidence.point.end.coordinates).p;
     let late = evidence.point.objective.sweep.late(&parameters);
-    // An input that acts at once and again after a dead time has a column for each.
-    let are_apart = |a: usize, b: usize| b < inputs && [a, b].iter().any(|i| late.get(*i) == Some(&true));
+    // An input that acts after several dead times has a column for each.
+    let delay = |i: usize| late.get(i).copied().flatten().unwrap_or(0.0);
+    let are_apart = |a: usize, b: usize| b < inputs && delay(a) != delay(b);
     let name = |i: usize| match i.checked_sub(inputs) {
         None => format!("the input `{}`", first.inputs()[i].name),
         Some(j) => format!("the output `{}`", first.outputs()[j].name),

@@ -176,24 +176,30 @@ fn is_unit(cell: &str) -> bool {
 
 /// Whether a column of this name holds what is wanted: the name itself, or the name with a unit behind it.
 pub(super) fn names(column: &str, wanted: &str) -> bool {
-    column == wanted || (split_unit(column).0 == wanted)
+    column == wanted || split_unit(column).0 == wanted || over_unit(column).is_some_and(|(name, _)| name == wanted)
 }
 
-/// A name and the unit behind it: `speed [rpm]`, `time (ms)`, `U / V`; behind a bar without spaces, as in `U/V`, only one that is known.
+/// A name and the unit in brackets behind it: `speed [rpm]`, `time (ms)`, `w / (rad/s)`.
 pub(super) fn split_unit(name: &str) -> (&str, Option<&str>) {
     for (open, close) in [('[', ']'), ('(', ')')] {
         let parts = name.strip_suffix(close).and_then(|name| name.rsplit_once(open));
-        let parts = parts.map(|(before, unit)| (before.trim_end_matches([' ', '/']), unit.trim()));
-        if let Some((before, unit)) = parts.filter(|(before, _)| !before.trim().is_empty()) {
-            return (before, Some(unit));
+        let parts = parts.map(|(before, unit)| (before.trim_end(), unit.trim()));
+        if let Some((before, unit)) = parts {
+            let before = before.strip_suffix(" /").unwrap_or(before).trim_end();
+            if !before.trim().is_empty() {
+                return (before, Some(unit));
+            }
         }
     }
-    let spaced = name.split_once(" / ");
-    let quotient = spaced.or_else(|| name.split_once('/').filter(|(_, unit)| is_unit(unit)));
-    match quotient.map(|(before, unit)| (before.trim_end(), unit.trim().trim_matches(BRACKETS))) {
-        Some((before, unit)) if !before.is_empty() && !unit.is_empty() => (before, Some(unit)),
-        _ => (name, None),
-    }
+    (name, None)
+}
+
+/// A name over a unit that is known: `U / V`, `t/ms`. It may be a ratio (`x/L`) or a unit (`m/s`) as well, so that it counts only where the name
+/// before the bar is wanted, and no other column has that name.
+pub(super) fn over_unit(name: &str) -> Option<(&str, &str)> {
+    let (before, unit) = name.rsplit_once(" / ").or_else(|| name.split_once('/'))?;
+    let (before, unit) = (before.trim_end(), unit.trim());
+    (!before.is_empty() && is_unit(unit)).then_some((before, unit))
 }
 
 /// Whether a cell holds a number, in any notation, a date, or says that there is none.

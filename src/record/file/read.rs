@@ -2,7 +2,7 @@
 
 use super::bytes::decoded;
 use super::columns;
-use super::guess::{names, split_unit};
+use super::guess::{over_unit, split_unit};
 use super::numbers::Numbers;
 use super::table::Table;
 use super::timing::Timing;
@@ -179,13 +179,14 @@ impl DataFile {
     pub(super) fn place(&self, columns: &[String], signal: &str) -> Result<usize, Error> {
         let said = self.said(signal);
         let (path, column) = (self.path.clone(), said.name().to_owned());
-        let exact = |name: &&String| **name == column;
-        let like = |name: &&String| names(name, &column);
-        let places = |is: &dyn Fn(&&String) -> bool| -> Vec<usize> {
+        let exact = |name: &str| name == column;
+        let bracketed = |name: &str| split_unit(name).0 == column;
+        let over = |name: &str| over_unit(name).is_some_and(|(name, _)| name == column);
+        let places = |is: &dyn Fn(&str) -> bool| -> Vec<usize> {
             columns.iter().enumerate().filter(|(_, name)| is(name)).map(|(at, _)| at).collect()
         };
-        let exact = places(&exact);
-        match if exact.is_empty() { places(&like) } else { exact }[..] {
+        let found = [&exact as &dyn Fn(&str) -> bool, &bracketed, &over].map(|is| places(is));
+        match found.into_iter().find(|found| !found.is_empty()).unwrap_or_default()[..] {
             [] => {
                 let available = columns.to_vec();
                 Err(Error::MissingColumn { path, column, signal: signal.to_owned(), available })
@@ -207,7 +208,8 @@ impl DataFile {
         let column = self.place(names, &signal.name)?;
         let name = &names[column];
         // A signal may have brackets in its own name.
-        let written = split_unit(name).1.filter(|_| *name != signal.name);
+        let over = || over_unit(name).filter(|(name, _)| *name == said.name()).map(|(_, unit)| unit);
+        let written = split_unit(name).1.or_else(over).filter(|_| *name != signal.name);
         let (mut factor, mut offset) = (said.factor.unwrap_or(1.0), said.offset);
         let of_file = said.unit.as_deref().or(written).or_else(|| below(column));
         if let Some(file) = of_file.filter(|_| said.factor.is_none()) {

@@ -2,7 +2,7 @@
 
 use super::bytes::decoded;
 use super::dates::Dates;
-use super::guess::split_unit;
+use super::guess::{over_unit, split_unit};
 use super::numbers::Numbers;
 use super::reading::{of_size, time_unit};
 use super::stamp::Stamp;
@@ -52,9 +52,14 @@ impl Ticks {
     }
 }
 
-/// The name of a column without its unit, spaces and large letters.
+/// The name of a column without spaces and large letters.
 fn plain(name: &str) -> String {
-    split_unit(name).0.to_lowercase().replace([' ', '_', '-'], "")
+    name.to_lowercase().replace([' ', '_', '-'], "")
+}
+
+/// The name and the unit of time over which it stands: `t / ms`.
+fn over_time(name: &str) -> Option<(&str, &str)> {
+    over_unit(name).filter(|(_, unit)| time_unit(unit).is_some())
 }
 
 /// Whether a number is a date and a time of day, digit by digit: 20250320140500, without seconds or with milliseconds. As milliseconds or microseconds
@@ -75,16 +80,16 @@ fn is_compact(number: f64) -> bool {
 impl DataFile {
     /// The column of time: the one that was said, `t`, or the only one of such a name.
     pub(super) fn time_column(&self, names: &[String]) -> Result<usize, Error> {
-        let called = |list: &[&str]| -> Vec<usize> {
-            (0..names.len()).filter(|at| list.contains(&plain(&names[*at]).as_str())).collect()
-        };
+        let are = |is: &dyn Fn(&str) -> bool| -> Vec<usize> { (0..names.len()).filter(|at| is(&names[*at])).collect() };
+        let called = |list: &[&str]| are(&|name| list.contains(&plain(split_unit(name).0).as_str()));
+        let over = || are(&|name| over_time(name).is_some_and(|(name, _)| NAMES.contains(&plain(name).as_str())));
         let found = self.place(names, "t");
         if found.is_ok() || self.said("t").name.is_some() {
             return found;
         }
         // Units stand behind an underscore, too.
-        let with_unit = || (0..names.len()).filter(|at| suffix(&names[*at]).is_some()).collect::<Vec<_>>();
-        for found in [called(&NAMES), with_unit(), called(&DATES)] {
+        let with_unit = || are(&|name| suffix(name).is_some());
+        for found in [called(&NAMES), over(), with_unit(), called(&DATES)] {
             if let [only] = found[..] {
                 return Ok(only);
             }
@@ -109,7 +114,14 @@ impl DataFile {
         if name.is_empty() && said.name.is_none() {
             return self.place(names, "t").map(|_| None);
         }
-        let written = said.unit.as_deref().or(split_unit(name).1).or_else(|| suffix(name)).or(below).map(str::trim);
+        let written = said
+            .unit
+            .as_deref()
+            .or(split_unit(name).1)
+            .or_else(|| over_time(name).map(|(_, unit)| unit))
+            .or_else(|| suffix(name))
+            .or(below)
+            .map(str::trim);
         let written = written.filter(|text| !NO_UNITS.contains(&text.to_lowercase().as_str()));
         let named = written.and_then(time_unit);
         let remedy = "say how many seconds one is by DataFile::factor(\"t\", ..)";
@@ -216,7 +228,7 @@ fn shown(named: Option<TimeUnit>, factor: f64) -> TimeUnit {
 /// A unit of time behind the name of a column of time: `time_ms`, `time ms`.
 fn suffix(name: &str) -> Option<&str> {
     let (before, unit) = name.rsplit_once(['_', ' '])?;
-    let before = before.trim().to_lowercase();
+    let before = plain(before);
     (time_unit(unit).is_some() && (before == "t" || NAMES.contains(&before.as_str()))).then_some(unit)
 }
 
