@@ -12,7 +12,6 @@ from greybox.frames import has_times
 from greybox.model import Model
 from greybox.parameters import Parameter
 from greybox.records import Hold, Initial, Record
-from greybox.signals import near
 
 __all__ = ["fleet"]
 
@@ -45,8 +44,8 @@ def fleet(
     npartitions : int, optional
         Into how many parts the records are divided; as many as the frame has without it.
     whole : bool
-        The samples of each record lie in one partition of the frame already, such as one file of whole records: nothing is shuffled, which
-        costs more than the fits. A record that lies in two partitions would be fitted twice, in parts.
+        The samples of each record lie in one partition of the frame already, such as one file of whole records: nothing is shuffled.
+        A record that lies in two partitions would be fitted twice, in parts.
     model, by, parameters, time, columns, hold, initial, **given
         As in :func:`greybox.fleet`.
 
@@ -72,9 +71,7 @@ def fleet(
     if given.get("sample_time") is not None:
         raise Error("a shuffle does not keep the order of samples, which sample_time needs; add a column of the time")
     made = plan(model, by, parameters, Record(None, None, time, None, columns, hold, initial), given)
-    missing = [name for name in made.needed() if name not in frame.columns]
-    if missing:
-        raise Error(f"there is no column `{missing[0]}`; the frame has: {near(missing[0], frame.columns)}")
+    made.check(list(frame.columns))
     if made.record.time is None and not has_times(frame._meta):
         raise Error('there is no column `t` or `time`, and no index of times; name the column by time="..."')
     of = {name: pd.Series(dtype=_plain(frame.dtypes[name])) for name in made.by}

@@ -11,7 +11,7 @@ import numpy as np
 from greybox import _core
 from greybox.errors import Error
 from greybox.estimate import VERDICTS
-from greybox.frames import Frame, is_readonly, rename, seconds
+from greybox.frames import Frame, is_readonly, rename, seconds, time_column
 from greybox.model import Model, checked
 from greybox.options import Options, settings
 from greybox.parameters import Parameter, declared, together
@@ -74,6 +74,30 @@ class Plan:
         """Give the columns that are read, but for the time."""
         return list(dict.fromkeys([*self.by, *self._signals()]))
 
+    def check(self, names: Sequence[str]) -> None:
+        """Refuse a frame of these columns if one of those that are read, but for the time, is missing."""
+        missing = [name for name in self.needed() if name not in names]
+        if missing:
+            raise Error(f"there is no column `{missing[0]}`; the frame has: {near(missing[0], names)}")
+
+    def shuffled(self, names: Sequence[str]) -> list[str]:
+        """Give those of the columns of a frame that a shuffle has to keep.
+
+        Raises
+        ------
+        Error
+            If one is missing, or if there is a constant step in the place of a column of the time.
+        """
+        if self.record.sample_time is not None:
+            raise Error("a shuffle does not keep the order of samples, which sample_time needs; add a column of the time")
+        self.check(names)
+        time = self.record.time or time_column(names)
+        if time is None:
+            raise Error(f"there is no column `t` or `time`; the frame has: {near('t', names)}. Name the column by time=\"...\"")
+        if time not in names:
+            raise Error(f"there is no column `{time}`; the frame has: {near(time, names)}")
+        return list(dict.fromkeys([*self.needed(), time]))
+
     def columns(self) -> dict[str, type]:
         """Give the columns of the result beside those of `by`, with the kind of their values."""
         of: dict[str, type] = {"samples": int}
@@ -99,9 +123,7 @@ class Plan:
         if isinstance(data, Path):
             raise Error(f"{data}: text files of many records are read by pandas: gb.fleet(model, pandas.read_csv({str(data)!r}), ...)")
         frame = Frame(data)
-        missing = [name for name in self.needed() if name not in frame]
-        if missing:
-            raise Error(f"there is no column `{missing[0]}`; the frame has: {near(missing[0], frame.names)}")
+        self.check(frame.names)
         keys = [frame.values(name) for name in self.by]
         places, firsts = _groups(keys)
         of_record = {name: frame.rows(name, firsts) for name in self.by}

@@ -8,11 +8,9 @@ from typing import Any
 
 from greybox.errors import Error
 from greybox.fleets import Plan, plan
-from greybox.frames import time_column
 from greybox.model import Model
 from greybox.parameters import Parameter
 from greybox.records import Hold, Initial, Record
-from greybox.signals import near
 
 __all__ = ["fleet"]
 
@@ -27,6 +25,7 @@ def fleet(
     whole: bool = False,
     parameters: Mapping[str, Parameter] | None = None,
     time: str | None = None,
+    sample_time: float | None = None,
     columns: Mapping[str, str] | None = None,
     hold: Hold | None = None,
     initial: Initial | None = None,
@@ -44,9 +43,9 @@ def fleet(
     blocks : int, optional
         Into how many blocks the records are divided; without it one for each core of the cluster.
     whole : bool
-        The samples of each record lie in one block of the dataset already, such as one file of whole records: nothing is shuffled, which
-        costs more than the fits. A record that lies in two blocks would be fitted twice, in parts.
-    model, by, parameters, time, columns, hold, initial, **given
+        The samples of each record lie in one block of the dataset already, such as one file of whole records: nothing is shuffled. A record
+        that lies in two blocks would be fitted twice, in parts. Ray cuts files of more than ``DataContext.target_max_block_size`` bytes.
+    model, by, parameters, time, sample_time, columns, hold, initial, **given
         As in :func:`greybox.fleet`.
 
     Returns
@@ -68,21 +67,11 @@ def fleet(
         )
     import ray
 
-    if given.get("sample_time") is not None:
-        raise Error("a shuffle does not keep the order of samples, which sample_time needs; add a column of the time")
-    made = plan(model, by, parameters, Record(None, None, time, None, columns, hold, initial), given)
+    made = plan(model, by, parameters, Record(None, None, time, sample_time, columns, hold, initial), given)
     schema = dataset.schema()
     if schema is None:
         raise Error("the dataset has no rows")
-    names = schema.names
-    missing = [name for name in made.needed() if name not in names]
-    if missing:
-        raise Error(f"there is no column `{missing[0]}`; the dataset has: {near(missing[0], names)}")
-    moment = time or time_column(names)
-    if moment is None:
-        raise Error(f"there is no column `t` or `time`; the dataset has: {near('t', names)}. Name the column by time=\"...\"")
-    needed = list(dict.fromkeys([*made.needed(), moment]))
-    parts = dataset.select_columns(needed)
+    parts = dataset.select_columns(made.shuffled(schema.names))
     if not whole:
         parts = parts.repartition(blocks or int(ray.cluster_resources().get("CPU", 1)), keys=made.by)
     return parts.map_batches(_fit, fn_args=[made], batch_size=None, batch_format="pyarrow")

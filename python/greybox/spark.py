@@ -6,12 +6,10 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from greybox.errors import Error
 from greybox.fleets import Plan, plan
 from greybox.model import Model
 from greybox.parameters import Parameter
 from greybox.records import Hold, Initial, Record
-from greybox.signals import near
 
 __all__ = ["fleet"]
 
@@ -73,10 +71,7 @@ def fleet(
             "spark.createDataFrame(frame)"
         )
     made = plan(model, by, parameters, Record(None, None, time, sample_time, columns, hold, initial), given)
-    needed = made.needed() + _time(made, frame.columns)
-    missing = [name for name in needed if name not in frame.columns]
-    if missing:
-        raise Error(f"there is no column `{missing[0]}`; the frame has: {near(missing[0], frame.columns)}")
+    needed = made.shuffled(frame.columns)
     keys = [f"`{name}` {frame.schema[name].dataType.simpleString()}" for name in made.by]
     schema = ", ".join(keys + [f"`{name}` {_TYPES[kind]}" for name, kind in made.columns().items()])
     fit = _worker(made)
@@ -88,18 +83,6 @@ def fleet(
         batches = cores * max(1, -(-records // (_BATCH * cores)))
     # A number that is asked for is not changed by adaptive execution, which would make one task of many small parts.
     return frame.select(*needed).repartition(batches, *made.by).mapInArrow(_partition(fit), schema)
-
-
-def _time(made: Plan, names: Sequence[str]) -> list[str]:
-    """Give the column of the time, if there is one."""
-    from greybox.frames import time_column
-
-    if made.record.sample_time is not None:
-        raise Error("a shuffle does not keep the order of samples, which sample_time needs; add a column of the time")
-    name = made.record.time or time_column(names)
-    if name is None:
-        raise Error(f"there is no column `t` or `time`; the frame has: {near('t', names)}. Name the column by time=\"...\"")
-    return [name]
 
 
 def _worker(made: Plan) -> Callable[[Any], Any]:

@@ -190,7 +190,8 @@ def ray() -> Iterator[Any]:
     ray = pytest.importorskip("ray")
     pytest.importorskip("ray.data")
     # Workers find the tests' modules by the path of this process.
-    ray.init(num_cpus=2, include_dashboard=False, logging_level="ERROR", log_to_driver=False, runtime_env={"env_vars": {"PYTHONPATH": ":".join(sys.path)}})
+    path = {"env_vars": {"PYTHONPATH": ":".join(sys.path)}}
+    ray.init(num_cpus=2, include_dashboard=False, logging_level="ERROR", log_to_driver=False, runtime_env=path)
     context = ray.data.DataContext.get_current()
     context.enable_progress_bars = False
     # So small that the samples of a record would lie in several blocks if blocks were cut.
@@ -207,6 +208,12 @@ def test_whole_blocks_on_ray(ray: Any, bodies: pd.DataFrame, zoned: pd.DataFrame
         gb.ray.fleet(cooling(), frame, columns={"room": "Room"}, **SAID)
     with pytest.raises(gb.Error, match="no column `t` or `time`"):
         gb.ray.fleet(cooling(), frame.drop_columns(["t"]), **SAID)
+    with pytest.raises(gb.Error, match="there is no column `when`"):
+        gb.ray.fleet(cooling(), frame, time="when", **SAID)
+    with pytest.raises(gb.Error, match="which sample_time needs"):
+        gb.ray.fleet(cooling(), frame, sample_time=0.1, **SAID)
+    with pytest.raises(gb.Error, match="the dataset has no rows"):
+        gb.ray.fleet(cooling(), ray.data.from_items([]), **SAID)
 
 
 def test_ray_with_a_worker_killed(
