@@ -99,7 +99,7 @@ fn exp<W: Wide>(x: W) -> W {
     polynomial(r, &SERIES).scale2(n)
 }
 
-/// Beyond, the hyperbolic tangent rounds to one: it lacks less than `2 exp(-40)`, 8.5e-18.
+/// Beyond, the hyperbolic tangent rounds to one: it is below one by less than `2 exp(-40)`, 8.5e-18.
 const SATURATED: f64 = 20.0;
 
 /// A quotient of polynomials near zero (S. L. Moshier, Cephes Mathematical Library, 1989), beyond by the exponential.
@@ -108,7 +108,7 @@ fn tanh<W: Wide>(x: W) -> W {
     const ABOVE: [f64; 3] = [-1.614_687_684_417_084_6e3, -9.928_772_310_019_185e1, -9.643_991_794_250_523e-1];
     const BELOW: [f64; 4] = [4.844_063_053_251_255e3, 2.235_488_390_601_004_5e3, 1.128_116_784_916_329_3e2, 1.0];
     let (one, size) = (W::splat(1.0), x.abs());
-    // As dry friction is mostly; the exponential would give the same bits.
+    // Dry friction is saturated at most samples. The exponential would give the same bits.
     if size.neg().all_below(-SATURATED) {
         return one.copysign(x);
     }

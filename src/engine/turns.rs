@@ -53,8 +53,8 @@ impl Turns {
 /// The same, with each new value of what is carried written `begin` slots beyond its own slot; `None` if that saves no copy.
 fn elsewhere(advance: &[Instruction], carried: usize, begin: Slot) -> Option<Vec<Instruction>> {
     let is_carried = |slot: Slot| usize::from(slot) < carried;
-    // Of an instruction, the last copy that carries what it computes: it writes the value to that second slot, and all that read it later read
-    // it there.
+    // For each instruction, the last copy of its value to a number that alternates. The instruction then writes to the second slot of that number,
+    // from which later instructions read the value, and the copy is left out.
     let (mut carries, mut writer) = (vec![None; advance.len()], vec![None; begin.into()]);
     for (at, one) in advance.iter().enumerate() {
         let Instruction { operation, to, pairs: [[from, _], ..], .. } = *one;

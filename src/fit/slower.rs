@@ -58,7 +58,7 @@ mod tests {
         }
     }
 
-    /// A rate of a million is moved to that of samples a tenth of a second apart, one that these show is not, and a bound is kept.
+    /// A decay of 1e6 1/s becomes 10 1/s, one per sample of 0.1 s. One of 20 1/s, a growth, and one whose bound does not allow it stay.
     #[test]
     fn rates_are_moved_to_that_of_the_samples() {
         let inputs: Vec<Voltage> = (0..40).map(|k| Voltage { u: f64::from(k % 7) }).collect();
@@ -74,7 +74,6 @@ mod tests {
             let found = moved(a).unwrap();
             assert!((found / 10.0 - 1.0).abs() < 2e-3, "{found}");
         }
-        // What grows is none of them.
         assert_eq!([free(20.0), free(-1e6), free(1e6).within(1e3, 1e7)].map(moved), [None; 3]);
     }
 }

@@ -96,8 +96,8 @@ fn eigenvalues_of(n: usize, slopes: &[f64]) -> Option<Vec<Complex<f64>>> {
     Some(schur.complex_eigenvalues().iter().copied().collect())
 }
 
-/// By which part of itself a number grows where an unknown grows by a part of itself, for each at a point of an experiment: `of` gives the number over that at
-/// the point. Initial states, and what another experiment has of its own, do not count.
+/// The slopes of the logarithm of a number with respect to the logarithms of the unknowns, by differences, at a point of an experiment. `of` gives the
+/// number divided by that at the point. Initial states, and what another experiment has of its own, have the slope zero.
 pub(crate) fn relative_slopes(
     objective: &Objective<'_>,
     (experiment, coordinates): (usize, &[f64]),
@@ -116,9 +116,9 @@ pub(crate) fn relative_slopes(
     unknowns.values(coordinates).into_iter().enumerate().map(slope).collect()
 }
 
-/// Changes some unknowns, all by the least parts of themselves, until a number at a point of an experiment is another one; `None` if they come to their
-/// bounds, or to where they do not move it. `of` gives the number of kind `N` at a point, where it was the second argument near it; `needed` the
-/// logarithm by which it has to grow, `largest` how much of it is tried at once.
+/// Newton's steps of some unknowns to where a number at a point of an experiment has another value, each step the least in logarithms; `None` if they
+/// come to their bounds, or to where they do not move the number. `of` gives the number at a point, of several that which is nearest to its second
+/// argument; `needed` the logarithm by which it has to grow; `largest` the most of that in one step.
 pub(crate) fn reached<N: Copy>(
     objective: &Objective<'_>,
     (experiment, coordinates): (usize, &[f64]),

@@ -124,7 +124,7 @@ fn unresolved_at<'p>(
     point: &'p StateAt,
     interval: f64,
 ) -> Option<Unresolved<'p>> {
-    let modes = of(&oscillating(objective, coordinates, point, TAU / (SAMPLES * interval))?);
+    let modes = oscillations(&oscillating(objective, coordinates, point, TAU / (SAMPLES * interval))?);
     let &mode = modes.iter().filter(|mode| is_seen_too_seldom(**mode, interval)).max_by(|a, b| a.1.total_cmp(&b.1))?;
     let alias = alias(mode.1, interval);
     let needed = (alias / mode.1).ln();
@@ -183,11 +183,11 @@ fn moved(
 
 /// Each oscillation about a point.
 fn modes(objective: &Objective<'_>, coordinates: &[f64], point: &StateAt) -> Option<Vec<Mode>> {
-    Some(of(&eigenvalues(objective, coordinates, point)?))
+    Some(oscillations(&eigenvalues(objective, coordinates, point)?))
 }
 
 /// The oscillations among eigenvalues.
-fn of(eigenvalues: &[Complex<f64>]) -> Vec<Mode> {
+fn oscillations(eigenvalues: &[Complex<f64>]) -> Vec<Mode> {
     eigenvalues.iter().filter(|value| value.im > 0.0).map(|value| (value.re, value.im)).collect()
 }
 
