@@ -75,6 +75,10 @@ pub struct Summary {
     /// `-2 ln` of the Gaussian likelihood of the (filtered) errors; not defined for weighted or robust fits.
     #[serde(with = "crate::real")]
     pub deviance: Option<f64>,
+    /// The logarithm of the likelihood. Where variances are predicted, a loss `rho(z)` stands for `z^2 / 2`, so that it is no longer that of a
+    /// distribution (CTSM prints the same); not defined for weighted fits and for other robust ones.
+    #[serde(with = "crate::real")]
+    pub log_likelihood: Option<f64>,
     /// Trial steps of the search.
     pub iterations: u64,
     /// Evaluations of the search with slopes that took a pass over the data.

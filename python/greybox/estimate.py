@@ -99,6 +99,14 @@ class Estimate:
         return self._estimate.engine
 
     @property
+    def log_likelihood(self) -> float | None:
+        """The logarithm of the likelihood; of a filter with a loss, with the loss of each innovation in place of half its square, as CTSM has it.
+
+        None where weights, or a loss without a filter, make the cost no likelihood.
+        """
+        return self._estimate.log_likelihood
+
+    @property
     def seconds(self) -> float:
         """The time that the fit took (s)."""
         return self._estimate.seconds

@@ -145,6 +145,11 @@ impl Estimate {
     }
 
     #[getter]
+    fn log_likelihood(&self) -> Option<f64> {
+        self.0.log_likelihood
+    }
+
+    #[getter]
     fn measurements(&self) -> u64 {
         self.0.measurements
     }

@@ -64,6 +64,7 @@ def test_states() -> None:
     )
     start = {"q": gb.free(0.2, log=True), "r": gb.free(0.2, log=True)}
     found = gb.fit(model, frame, parameters=start, time="t", initial={"level": gb.fixed(0.0)}, predictor="kalman")
+    assert found.log_likelihood == pytest.approx(-0.5 * found.to_dict()["deviance"], rel=1e-12)
     filtered, smoothed = found.filtered(), found.smoothed()
     assert list(smoothed.columns) == ["t", "level", "level_deviation"] and len(smoothed) == 300
     # The last sample has nothing after it; before it, less is left.

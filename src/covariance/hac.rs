@@ -59,6 +59,8 @@ pub(crate) type First<'f> = (EachScore<'f, Lagged>, Option<Errors<'f>>);
 /// Its sums: of products of the scores over time and, but where variances are predicted, of the errors.
 pub(crate) struct Sums {
     count: usize,
+    /// The mean of the squared influences.
+    mean_square: f64,
     triangle: Information,
     products: [DMatrix<f64>; 2],
     pub errors: Option<ErrorSums>,
@@ -89,8 +91,12 @@ impl Frame {
 
 impl Sums {
     pub fn of((scores, errors): First<'_>) -> Self {
+        let mean_square = scores.mean_square();
+        let alone = scores.alone(mean_square);
         let Lagged { count, scores, products, .. } = scores.into;
-        Sums { count, triangle: scores.triangle(), products, errors: errors.map(|errors| errors.into) }
+        let mut triangle = scores.triangle();
+        alone.iter().for_each(|row| triangle.absorb_row(row, 0.0));
+        Sums { count, mean_square, triangle, products, errors: errors.map(|errors| errors.into) }
     }
 }
 
@@ -122,7 +128,10 @@ pub(crate) fn hac(
         filtered.into_iter().map(|one| one.map(FilteredSlopes::triangle)).collect();
     let uncertainty = stationary.as_ref().map_or(0.0, |found| found.uncertainty);
     let run = |(e, moving): (usize, Option<EachScore<'_, MovingSums<'_>>>)| match (&prewhitened[e], moving) {
-        (Some(by), Some(moving)) => Some(Run::Long(by.run(frames[e].kept.clone(), &moving.into.triangle())?)),
+        (Some(by), Some(moving)) => {
+            let alone = moving.alone(first[e].mean_square);
+            Some(Run::Long(by.run(frames[e].kept.clone(), moving.into.triangle(), &alone)?))
+        }
         _ => Some(Run::Short { triangle: filtered[e].clone()?, uncertainty }),
     };
     let runs: Vec<Run> = moving.into_iter().enumerate().map(run).collect::<Option<_>>()?;

@@ -4,6 +4,7 @@ mod again;
 mod draw;
 mod minima;
 mod progress;
+mod screen;
 
 use super::lockstep::{Search, Stage};
 use super::search::{Rounds, checkpoint};
@@ -84,14 +85,15 @@ pub(super) fn search_from_many(
     if let Some(earlier) = earlier {
         return again::search_again(plain, optimizer, earlier);
     }
-    let starts = draw::starts(plain, count);
+    let wide = is_wide(plain);
     let file = checkpoint(plain, optimizer)?;
     let resumed = file.as_ref().map(CheckpointFile::load::<Places>).transpose()?.flatten();
-    let (cycle, places, led) = match resumed {
-        Some((_, cycle, Some(places))) if places.0.len() == count => (cycle, places.0, 0),
+    let (cycle, Places { starts, places }, led) = match resumed {
+        Some((_, cycle, Some(resumed))) if resumed.places.len() == count => (cycle, resumed, 0),
         _ => {
+            let (starts, screened) = starts(plain, count, wide);
             let (led, evaluations) = in_stages(plain, &starts);
-            (0, led.into_iter().map(Ok).collect(), evaluations)
+            (0, Places { starts, places: led.into_iter().map(Ok).collect() }, evaluations + screened)
         }
     };
     // The declared start is evaluated whatever the limits, so that there is an answer.
@@ -100,12 +102,14 @@ pub(super) fn search_from_many(
         false => begin(plain, optimizer, &places[i]),
     };
     let runs = each(count, begin);
-    let mut searches = Searches { plain, comparison: Comparison::new(plain), runs, cycle, wide: is_wide(plain) };
+    let comparison = Comparison::new(plain);
+    let mut searches = Searches { plain, comparison, starts, runs, cycle, wide };
     if let Some(file) = &file {
         // Written at once, so that a path that cannot be written is reported before the search.
         progress::write(&searches, file)?;
     }
     searches.run(file.as_ref());
+    let starts = searches.starts;
     let ends: Vec<Result<SearchEnd, NoEnd>> = searches.runs.into_iter().map(Run::end).collect();
     let Some((best, found)) = minima::found(plain, &starts, &ends) else {
         return Err(declared_error(plain, &starts[0]));
@@ -113,6 +117,19 @@ pub(super) fn search_from_many(
     let end = ends.into_iter().nth(best).and_then(Result::ok).ok_or_else(|| declared_error(plain, &starts[0]))?;
     let found = Starts { evaluations: found.evaluations + led, ..found };
     Ok(SearchEnd { starts: Some(found), write_error: file.and_then(|file| file.write_error()), ..end })
+}
+
+/// The declared start and others, of which half are the best of many by their costs, and the evaluations that these took. Stages begin where
+/// no simulation follows the measurements, so that its cost says nothing.
+fn starts(plain: &Objective<'_>, count: usize, wide: bool) -> (Vec<Vec<f64>>, u64) {
+    let half = (count - 1) / 2;
+    if half == 0 || plain.problem.settings.lead != Lead::Declared {
+        return (draw::starts(plain, count, draw::REACH), 0);
+    }
+    let (best, evaluations) = screen::best(plain, half, wide);
+    let mut starts = draw::starts(plain, count - best.len(), draw::REACH);
+    starts.extend(best);
+    (starts, evaluations)
 }
 
 /// Where stages lead these starts, if they were asked for, and their evaluations.
@@ -141,6 +158,14 @@ fn begin<'p>(plain: &'p Objective<'p>, optimizer: &Arc<dyn Optimizer>, place: &R
     match Rounds::new(plain, optimizer, place) {
         Ok(rounds) => Run::Searching(Box::new(Search::new(rounds))),
         Err(error) => Run::Failed(NoEnd::at_start(error)),
+    }
+}
+
+/// Slopes and cost at each point.
+fn linearized(points: &[At<'_>], wide: bool) -> Vec<Answer> {
+    match wide && points.len() >= TOGETHER {
+        true => linearize_together(points),
+        false => each(points.len(), |i| points[i].0.linearize(points[i].1)),
     }
 }
 
@@ -212,6 +237,7 @@ impl<'p> Run<'p> {
 struct Searches<'p> {
     plain: &'p Objective<'p>,
     comparison: Comparison,
+    starts: Vec<Vec<f64>>,
     runs: Vec<Run<'p>>,
     /// Evaluations that each search was given so far.
     cycle: u64,
@@ -246,10 +272,7 @@ impl<'p> Searches<'p> {
             _ => None,
         });
         let (requesting, points): (Vec<usize>, Vec<At<'_>>) = requesting.unzip();
-        let answers = match self.wide && points.len() >= TOGETHER {
-            true => linearize_together(&points),
-            false => each(points.len(), |i| points[i].0.linearize(points[i].1)),
-        };
+        let answers = linearized(&points, self.wide);
         let lost = || Run::Failed(NoEnd::new(true, ""));
         let taken = requesting.iter().zip(answers).map(|(&i, answer)| {
             let run = std::mem::replace(&mut self.runs[i], lost());
@@ -299,6 +322,7 @@ impl<'p> Searches<'p> {
         }
     }
 
+    /// Gives up the searches that take far longer than others, except that from the declared start, of which the end is reported.
     fn give_up_hopeless(&mut self) {
         let minima = self.runs.iter().filter_map(|run| match run {
             Run::Ended { end, level } if end.outcome.converged() => Some((*level, end.iterations)),
@@ -307,7 +331,7 @@ impl<'p> Searches<'p> {
         let (levels, trials): (Vec<f64>, Vec<u64>) = minima.unzip();
         let Some(typical) = typical(trials, self.runs.len()) else { return };
         let best = levels.into_iter().fold(f64::INFINITY, f64::min);
-        for run in &mut self.runs {
+        for run in self.runs.iter_mut().skip(1) {
             let Run::Searching(search) = run else { continue };
             let Some(linear) = search.machine.linearization() else { continue };
             let level = self.comparison.level(&search.objective, linear.cost);

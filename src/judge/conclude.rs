@@ -83,6 +83,7 @@ fn summary_of(evidence: &Evidence<'_>, seconds: f64) -> Result<Summary, Error> {
         experiments: summary::experiments(&evidence.point),
         outputs: summary::outputs(evidence, &noise),
         deviance: summary::deviance(evidence),
+        log_likelihood: summary::log_likelihood(evidence),
         covariance: covariances.unknowns.unwrap_or_else(|| Covariance::zeros(unknowns.len())),
         unknowns,
         noise_covariance: match noise {

@@ -116,3 +116,21 @@ pub(crate) fn deviance(evidence: &Evidence<'_>) -> Option<f64> {
     // Without any error the likelihood is unbounded.
     deviance.is_finite().then_some(deviance)
 }
+
+/// Half the deviance, with the sign changed; with a loss and predicted variances the errors' losses in place of half their squares.
+pub(crate) fn log_likelihood(evidence: &Evidence<'_>) -> Option<f64> {
+    let Point { objective, end, linear, .. } = &evidence.point;
+    if let Some(deviance) = deviance(evidence) {
+        return Some(-0.5 * deviance);
+    }
+    if objective.is_weighted() || !objective.sweep.predicts_variance() {
+        return None;
+    }
+    let problem = objective.problem;
+    let priors: f64 = problem.unknowns.priors(&end.coordinates).map(|(_, _, error)| 0.5 * error * error).sum();
+    let (n, log_determinant) = (evidence.residuals.measured as f64, evidence.residuals.log_determinant);
+    // The cost has the logarithms of the variances times the mean of `psi(z) z`, with which noise levels are consistent.
+    let losses = linear.cost - priors - 0.5 * problem.kappa * log_determinant;
+    let found = -losses - 0.5 * log_determinant - 0.5 * n * std::f64::consts::TAU.ln();
+    found.is_finite().then_some(found)
+}

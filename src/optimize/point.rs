@@ -15,6 +15,8 @@ pub(super) struct Point {
     pub gradient: Vec<f64>,
     pub norms: Vec<f64>,
     pub held: Vec<bool>,
+    /// Whose change by their own size moves the residual by less than its rounding: their gradient is rounding, too.
+    silent: Vec<bool>,
     /// How far each unknown may move, down and up.
     pub limits: Vec<(f64, f64)>,
     bounds: Vec<(f64, f64)>,
@@ -68,10 +70,13 @@ impl Point {
         let has_shrunk = |i: usize| seen.norms.get(i).is_some_and(|largest| norms[i] < SHRUNK * largest);
         let negligible = |i: usize| is_logarithm(i) && has_shrunk(i) && is_negligible(norms[i], gradient[i], residual);
         let held: Vec<bool> = (0..x.len()).map(|i| norms[i] == 0.0 || on_bound(i) || negligible(i)).collect();
+        let size = |i: usize| if is_logarithm(i) { 1.0 } else { x[i].abs() };
+        let is_silent = |i: usize| size(i) > 0.0 && norms[i] * size(i) <= f64::EPSILON * residual;
+        let silent: Vec<bool> = (0..x.len()).map(is_silent).collect();
         let damping: Vec<f64> = norms.iter().map(|norm| RANK * norm).collect();
         let full = linear.step_within(&damping, &held, &limits);
         let potential = full.as_ref().map_or(f64::INFINITY, |step| linear.predicted_reduction(step));
-        Some(Point { x, linear, gradient, norms, held, limits, bounds, full, potential })
+        Some(Point { x, linear, gradient, norms, held, silent, limits, bounds, full, potential })
     }
 
     pub fn cost(&self) -> f64 {
@@ -88,10 +93,11 @@ impl Point {
         (0..self.x.len()).filter(|&i| !self.held[i])
     }
 
-    /// Largest cosine between the residual and a free column of the Jacobian.
+    /// Largest cosine between the residual and a free column of the Jacobian that moves it.
     pub fn cosine(&self) -> f64 {
         let residual = self.linear.sum_of_squares().sqrt();
-        self.free().map(|i| self.gradient[i].abs() / (self.norms[i] * residual)).fold(0.0, f64::max)
+        let moving = self.free().filter(|&i| !self.silent[i]);
+        moving.map(|i| self.gradient[i].abs() / (self.norms[i] * residual)).fold(0.0, f64::max)
     }
 
     /// Largest part of itself, or of the standard error it has at least, by which the full step moves an unknown.

@@ -612,7 +612,18 @@ fn noise_levels_under_a_robust_loss() {
             assert!((ratio[0] / ratio[1] - 1.0).abs() < 0.12, "{ratio:?}: {same}");
         }
     }
+    assert!((plain.log_likelihood.unwrap() / plain.deviance.unwrap() + 0.5).abs() < 1e-12, "{plain}");
     let fit = fit().loss(Huber(1.345)).run().unwrap();
+    let (mut expected, mut x, mut p) = (0.0, 0.0, 0.0);
+    for seen in record.outputs() {
+        for (y, sigma) in [(seen.y, fit.parameters.y), (seen.z, fit.parameters.z)] {
+            let (error, variance): (f64, f64) = (y - x, p + sigma * sigma);
+            expected -= Huber(1.345).rho(error / variance.sqrt()) + 0.5 * (TAU * variance).ln();
+            (x, p) = (x + p / variance * error, p * sigma * sigma / variance);
+        }
+        p += fit.parameters.drift * fit.parameters.drift;
+    }
+    assert!((fit.log_likelihood.unwrap() / expected - 1.0).abs() < 1e-10, "{:?} {expected}", fit.log_likelihood);
     for (found, truth) in [(fit.parameters.y, truth.y), (fit.parameters.z, truth.z)] {
         // Four deviations.
         assert!((found / truth - 1.0).abs() < 0.05, "{found} for {truth}: {fit}");

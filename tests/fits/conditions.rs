@@ -88,6 +88,6 @@ fn the_time_of_a_switch_is_said_to_stand_in_conditions() {
 /// A switch behind the end of the record changes nothing, at twice the time and at half of it.
 #[test]
 fn a_condition_that_is_never_met_is_said() {
-    let never = found(&Switched, free(1e3), None);
+    let never = found(&Switched, free(1e3), Some(1));
     assert!(text(&never).contains("come out the same at every sample"), "{}", text(&never));
 }

@@ -78,7 +78,7 @@ fn the_best_of_many_minima_is_found_and_the_others_are_listed() {
 #[test]
 fn one_of_many_wrong_minima_is_not_usable() {
     let record = sine();
-    let start = Wave { omega: free(12.0).within(10.0, 60.0), amplitude: free(1.0) };
+    let start = Wave { omega: free(31.0).within(10.0, 60.0), amplitude: free(1.0) };
     let fit = Fit::new(&Sine, &record).parameters(start).starts(10).run().unwrap();
     println!("{fit} {:?}", fit.starts);
     let once = fit.warnings.iter().find(|one| one.code == WarningCode::MinimumFoundOnce).unwrap();
@@ -240,17 +240,18 @@ fn starts_are_drawn_from_what_is_known() {
     let many = |amplitude: Parameter| {
         let parameters = Wave { omega: free(0.6).within(0.01, 0.9), amplitude };
         let fit = Fit::new(&Sine, &record).parameters(parameters).starts(33).run().unwrap();
-        let failed = fit.starts.clone().unwrap().failed.into_iter().map(|one| one.start);
-        failed.filter(|start| start[0].1 != 0.6).collect::<Vec<_>>()
+        let failed = fit.starts.clone().unwrap().failed.into_iter().filter(|one| !one.evaluated);
+        failed.map(|one| one.start).collect::<Vec<_>>()
     };
     let found = many(free(-2.0));
-    assert!(found.len() > 20, "{}", found.len());
-    // In logarithms, 89 % of 0.01 ... 0.9 lies below 0.5.
-    assert!(found.iter().filter(|start| start[0].1 < 0.1).count() > 10);
+    // In logarithms, 87 % of 0.01 ... 0.9 lies below 0.5, where nothing can be evaluated, and 51 % below 0.1; of the 30 starts that are not the best
+    // of many: of those above 0.5 two are not near each other.
+    assert!((24..=28).contains(&found.len()), "{}", found.len());
+    assert!((13..=17).contains(&found.iter().filter(|start| start[0].1 < 0.1).count()), "{found:?}");
     assert!(found.iter().all(|start| (-20.0..=-0.2).contains(&start[1].1)), "{found:?}");
     let prior: Vec<f64> = many(free(1.0).prior(5.0, 0.5)).iter().map(|start| start[1].1).collect();
     let mean = prior.iter().sum::<f64>() / prior.len() as f64;
-    // Some 30 draws of deviation 0.5: 0.09 for the mean at random, less when stratified.
+    // Some 26 draws of deviation 0.5: 0.1 for the mean at random, less when stratified.
     assert!((mean - 5.0).abs() < 0.3 && prior.iter().all(|x| (x - 5.0).abs() < 2.0), "{prior:?}");
 }
 

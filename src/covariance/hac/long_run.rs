@@ -56,10 +56,15 @@ impl Prewhitened {
         Some(Prewhitened { count: length, window, root, w, a, innovations })
     }
 
-    /// With the triangle of the moving sums.
-    pub fn run(&self, kept: Vec<usize>, sums: &Information) -> Option<LongRun> {
-        let Prewhitened { count, window, root, a, innovations, .. } = self;
+    /// With the triangle of the moving sums, and the scores that are independent of all others.
+    pub fn run(&self, kept: Vec<usize>, mut sums: Information, alone: &[Vec<f64>]) -> Option<LongRun> {
+        let Prewhitened { count, window, root, w, a, innovations } = self;
         let n = a.nrows();
+        for score in alone {
+            // What recoloring makes the score of.
+            let row = (DMatrix::identity(n, n) - a) * w.transpose() * DVector::from_column_slice(score);
+            sums.absorb_row(row.as_slice(), 0.0);
+        }
         // Scores that sum to zero have moving sums that are smaller by their part of the record.
         let part = *window as f64 / count;
         let sums = DMatrix::from_fn(n, n, |i, j| sums.at(i, j)) / (1.0 - part + part * part / 3.0).sqrt();

@@ -1,6 +1,6 @@
 //! Accumulators of scores in order of time.
 
-use crate::covariance::leverage::{ALONE, form};
+use crate::covariance::leverage::{LEAST, form};
 use crate::information::{Gathering, Information};
 use crate::problem::{Accumulate, Objective};
 use crate::sweep::Window;
@@ -17,8 +17,8 @@ pub(crate) trait AccumulateScores: Send {
 
 /// The score of each sample in the columns kept: the sum over the outputs of `w psi(z) g` and, where variances `v` are predicted, of
 /// `w (psi(z) z - kappa) dv / (2 v)`. Each error is divided by the root of one less its leverage, with which the variance of
-/// independent errors is right (HC2). Without the root, as in the sandwich for independent errors, the standard error of an initial
-/// state that a single measurement determines is several times too large.
+/// independent errors is right (HC2). The error of a measurement that alone determines an unknown, such as the first one an initial state,
+/// is rounding and says nothing of its noise: it has no score, and its slopes are kept, by which its variance is that of the others.
 pub(crate) struct EachScore<'s, T> {
     objective: &'s Objective<'s>,
     experiment: usize,
@@ -27,6 +27,10 @@ pub(crate) struct EachScore<'s, T> {
     inverse: &'s DMatrix<f64>,
     slopes: Vec<f64>,
     score: Vec<f64>,
+    /// The slopes of the measurements that alone determine an unknown, times the roots of their weights.
+    alone: Vec<Vec<f64>>,
+    /// The sum of the squared influences of the others times their weights, and their number.
+    squares: [f64; 2],
     pub into: T,
 }
 
@@ -38,7 +42,19 @@ impl<'s, T> EachScore<'s, T> {
         into: T,
     ) -> Self {
         let (slopes, score) = (vec![0.0; inverse.nrows()], vec![0.0; kept.len()]);
-        EachScore { objective, experiment, kept, inverse, slopes, score, into }
+        EachScore { objective, experiment, kept, inverse, slopes, score, alone: vec![], squares: [0.0; 2], into }
+    }
+
+    /// Their scores, of the variance that the others have on average.
+    pub fn alone(&self, mean_square: f64) -> Vec<Vec<f64>> {
+        let size = mean_square.sqrt();
+        self.alone.iter().map(|row| row.iter().map(|slope| slope * size).collect()).collect()
+    }
+
+    /// The mean of the squared influences.
+    pub fn mean_square(&self) -> f64 {
+        let [sum, count] = self.squares;
+        sum / count.max(1.0)
     }
 }
 
@@ -53,11 +69,17 @@ impl<T: AccumulateScores> Accumulate for EachScore<'_, T> {
             for j in 0..window.outputs() {
                 let z = window.error(k, j, lane);
                 self.slopes.iter_mut().enumerate().for_each(|(c, slope)| *slope = window.at(k, j, c, lane));
-                let less = (1.0 - weight * form(self.inverse, &self.slopes)).max(ALONE);
+                let less = 1.0 - weight * form(self.inverse, &self.slopes);
                 let influence = loss.map_or(z, |loss| loss.psi(z));
-                let psi = weight * influence / less.sqrt();
-                for (score, &c) in self.score.iter_mut().zip(self.kept) {
-                    *score += psi * self.slopes[c];
+                if less > LEAST {
+                    let psi = weight * influence / less.sqrt();
+                    for (score, &c) in self.score.iter_mut().zip(self.kept) {
+                        *score += psi * self.slopes[c];
+                    }
+                    self.squares[0] += weight * influence * influence / less;
+                    self.squares[1] += f64::from(weight > 0.0);
+                } else {
+                    self.alone.push(self.kept.iter().map(|&c| weight.sqrt() * self.slopes[c]).collect());
                 }
                 if window.has_variances() {
                     let variance = window.variance_row(k, j);
@@ -74,6 +96,8 @@ impl<T: AccumulateScores> Accumulate for EachScore<'_, T> {
     }
 
     fn append(&mut self, later: Self) {
+        self.alone.extend(later.alone);
+        self.squares.iter_mut().zip(later.squares).for_each(|(own, later)| *own += later);
         self.into.append(later.into);
     }
 }

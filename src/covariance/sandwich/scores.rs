@@ -7,7 +7,8 @@
 //!
 //! Where the others predict a measurement with more than five times its noise, they say nothing of its noise, and the variance of that
 //! prediction nothing of the estimate. One less the leverage counts as [`LEAST`] there at least: of a measurement that alone determines an
-//! unknown the variance is then `CANCELED / LEAST`, ten times that of the noise of all, instead of growing without bound.
+//! unknown the variance is then `CANCELED / LEAST`, ten times that of the noise of all, instead of growing without bound. Where variances
+//! are predicted, as by a filter whose first measurement alone determines the initial state, it is the predicted one.
 
 use crate::covariance::leverage::LEAST;
 use crate::covariance::shares::Shares;
@@ -89,8 +90,13 @@ impl Accumulate for Scores<'_> {
                 take(window.row(k, j), &mut slopes);
                 let leverage = self.shares.take(weight, &slopes, z, (j, sample));
                 let less = (1.0 - leverage).max(LEAST);
-                self.add_score(&slopes, weight * psi / less, less.sqrt());
-                let canceled = (CANCELED * weight * self.noise * leverage / less).sqrt();
+                let mut part = CANCELED * leverage / less;
+                if window.has_variances() && less == LEAST {
+                    part = 1.0;
+                } else {
+                    self.add_score(&slopes, weight * psi / less, less.sqrt());
+                }
+                let canceled = (part * weight * self.noise).sqrt();
                 slopes.iter_mut().for_each(|slope| *slope *= canceled);
                 self.scores.take(&slopes, 0.0);
             }

@@ -33,7 +33,9 @@ pub(super) fn search_again(
     let mut begins: Vec<(Vec<f64>, u64)> = minima.collect();
     begins.extend(broken.iter().map(|failed| (place(&failed.start), 1)));
     let runs = each(begins.len(), |i| begin(plain, optimizer, &Ok(begins[i].0.clone())));
-    let mut searches = Searches { plain, comparison: Comparison::new(plain), runs, cycle: 0, wide: is_wide(plain) };
+    let starts = begins.iter().map(|(place, _)| place.clone()).collect();
+    let (comparison, wide) = (Comparison::new(plain), is_wide(plain));
+    let mut searches = Searches { plain, comparison, starts, runs, cycle: 0, wide };
     searches.run(None);
     let mut groups: Vec<Vec<(Vec<f64>, Ended)>> = vec![];
     for (run, (place, count)) in searches.runs.into_iter().map(Run::end).zip(begins) {

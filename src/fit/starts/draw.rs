@@ -7,13 +7,13 @@ use crate::random::Random;
 use statrs::distribution::{ContinuousCDF, Normal};
 
 /// How far a start without bounds or prior is drawn to either side, as a factor.
-const REACH: f64 = 10.0;
+pub(super) const REACH: f64 = 10.0;
 /// Bounds of one sign whose ratio is at least this are a range of magnitudes.
 const DECADE: f64 = 10.0;
 const SEED: u64 = 0x5354_4152_5453;
 
-/// The coordinates of `count` starts, the declared one first.
-pub(super) fn starts(plain: &Objective<'_>, count: usize) -> Vec<Vec<f64>> {
+/// The coordinates of `count` starts, the declared one first; those of unknowns without bounds or prior within a factor `reach` of it.
+pub(super) fn starts(plain: &Objective<'_>, count: usize, reach: f64) -> Vec<Vec<f64>> {
     let unknowns = &plain.problem.unknowns;
     let declared = unknowns.start();
     let others = count - 1;
@@ -27,7 +27,7 @@ pub(super) fn starts(plain: &Objective<'_>, count: usize) -> Vec<Vec<f64>> {
         }
         let mut random = Random::stream(SEED, i as u64);
         for (start, part) in starts[1..].iter_mut().zip(strata(others, &mut random)) {
-            let value = drawn(&unknown.parameter, part, sizes[i]);
+            let value = drawn(&unknown.parameter, part, sizes[i], reach);
             start[i] = transform.to_coordinate(value).max(bounds.0).min(bounds.1);
         }
     }
@@ -56,7 +56,7 @@ fn sizes(plain: &Objective<'_>, declared: &[f64]) -> Vec<f64> {
 }
 
 /// The value at a part (0 to 1) of what is known of a parameter.
-fn drawn(parameter: &Parameter, part: f64, size: f64) -> f64 {
+fn drawn(parameter: &Parameter, part: f64, size: f64, reach: f64) -> f64 {
     let Parameter { start, upper, prior, transform, .. } = *parameter;
     let is_log = transform == Transform::Log;
     let lower = if is_log || parameter.positive { parameter.lower.max(0.0) } else { parameter.lower };
@@ -74,9 +74,9 @@ fn drawn(parameter: &Parameter, part: f64, size: f64) -> f64 {
     } else if whole && !is_log {
         between(lower, upper)
     } else if start > 0.0 {
-        geometric((start / REACH).max(lower), (start * REACH).min(upper))
+        geometric((start / reach).max(lower), (start * reach).min(upper))
     } else if start < 0.0 {
-        -geometric((-start / REACH).max(-upper), (-start * REACH).min(-lower))
+        -geometric((-start / reach).max(-upper), (-start * reach).min(-lower))
     } else {
         between(lower.max(-size), upper.min(size))
     }
@@ -100,7 +100,7 @@ mod tests {
     /// by its size; by the quantiles of a prior, cut off at bounds.
     #[test]
     fn what_is_known_is_drawn_from() {
-        let quarter = |parameter: Parameter| drawn(&parameter, 0.25, 3.0);
+        let quarter = |parameter: Parameter| drawn(&parameter, 0.25, 3.0, REACH);
         let prior = |parameter: Parameter| parameter.prior(5.0, 2.0);
         let cases = [
             (free(1.0).within(-1.0, 3.0), 0.0),
@@ -191,7 +191,7 @@ mod tests {
             let record = record(initial);
             let parameters = Curve { a: free(1.0), b: fixed(0.0), c: fixed(0.0) };
             let problem = Fit::new(&Decay, &record).parameters(parameters).noise(Level { x: 0.3 }).problem().unwrap();
-            let starts = starts(&problem.objective().unwrap(), 5);
+            let starts = starts(&problem.objective().unwrap(), 5, REACH);
             starts.iter().filter(|start| start[1] != 0.5).count()
         };
         assert_eq!(drawn(free(0.5)), 0);

@@ -9,9 +9,13 @@ use argmin::core::{KV, State};
 use serde::{Deserialize, Serialize};
 use std::sync::PoisonError;
 
-/// State of the searches in a checkpoint: the point of each search, or the cause why there is none.
+/// State of the searches in a checkpoint.
 #[derive(Serialize, Deserialize)]
-pub(super) struct Places(pub Vec<Result<Vec<f64>, NoEnd>>);
+pub(super) struct Places {
+    pub starts: Vec<Vec<f64>>,
+    /// The point of each search, or the cause why there is none.
+    pub places: Vec<Result<Vec<f64>, NoEnd>>,
+}
 
 /// Writes the checkpoint.
 pub(super) fn write(searches: &Searches<'_>, file: &CheckpointFile) -> Result<(), Error> {
@@ -20,7 +24,7 @@ pub(super) fn write(searches: &Searches<'_>, file: &CheckpointFile) -> Result<()
         Run::Ended { end, .. } => Ok(end.coordinates.clone()),
         Run::Failed(none) => Err(none.clone()),
     };
-    let places = Places(searches.runs.iter().map(place).collect());
+    let places = Places { starts: searches.starts.clone(), places: searches.runs.iter().map(place).collect() };
     let best = best(searches).map_or(vec![], |(place, _)| place.to_vec());
     file.write(&best, searches.cycle, &places)
 }

@@ -49,6 +49,23 @@ fn what_its_bound_holds() {
     }
 }
 
+/// Residuals 1e-3 and 4 in the columns of two unknowns of size 50. The slope of the second counts as long as a change of 50 moves the residual by more than
+/// its last digit, `4 * 2^-52`, and always where the unknown is zero, so that its size is not known.
+#[test]
+fn slopes_of_what_changes_nothing_do_not_count() {
+    let cosine = |norm: f64, x: f64| {
+        let mut information = Information::new(2);
+        information.absorb_row(&[1.0, 0.0], 1e-3);
+        information.absorb_row(&[0.0, norm], 4.0);
+        let linear = Linearization::new(0.5 * information.residual_at_zero(), 2, vec![information]);
+        Point::new(vec![50.0, x], linear, &Domain::default(), &Seen::default()).unwrap().cosine()
+    };
+    for (norm, x, counts) in [(2e-17, 50.0, true), (1e-17, 50.0, false), (1e-17, 0.0, true)] {
+        let expected = if counts { 1.0 } else { 2.5e-4 };
+        assert!((cosine(norm, x) - expected).abs() < 1e-7, "{norm} {x}: {}", cosine(norm, x));
+    }
+}
+
 #[test]
 fn what_the_cost_resolves() {
     assert_eq!(at(0.0, far()).resolution(), 12.5 * 1e-13);

@@ -15,7 +15,7 @@ impl Term {
 }
 
 /// The terms of a report.
-pub(super) const TERMS: [Term; 19] = [
+pub(super) const TERMS: [Term; 20] = [
     Term {
         id: "error-index",
         words: &["error index"],
@@ -94,6 +94,12 @@ pub(super) const TERMS: [Term; 19] = [
         words: &["σ of noise per 1 %"],
         meaning: "How far the outputs move, in standard deviations of the noise over the whole record, if the unknown changes by \
                   1 %. Below a few it is hardly seen.",
+    },
+    Term {
+        id: "log-likelihood",
+        words: &["log-likelihood", "ln L"],
+        meaning: "The logarithm of the likelihood; where variances are predicted and a loss was asked for, with the loss of each error in place \
+                  of half its square.",
     },
     Term {
         id: "deviance",

@@ -80,6 +80,7 @@ fn figures(facts: &Facts) -> Table {
     let s = &facts.estimate;
     let counts = [("measurements", s.measurements), ("unknowns", s.unknowns.len() as u64)];
     let criteria = [
+        ("log-likelihood", s.log_likelihood),
         ("deviance", s.deviance),
         ("AIC", s.aic()),
         ("AICc", s.aicc()),
