@@ -97,7 +97,7 @@ impl Objective<'_> {
             return Ok(Guess::Right(Some(Borders { right: true, ..(*known).clone() })));
         }
         let affine = self.problem.cuts.affine;
-        let squares = self.loss().is_none() && !self.sweep.predicts_variance();
+        let squares = self.is_sum_of_squares();
         match self.memory.best().filter(|_| squares) {
             Some(best) if affine => Ok(Guess::Affine(self.extrapolated(coordinates, values, &best), MOVED)),
             Some(best) => Ok(Guess::Nonlinear(self.extrapolated(coordinates, values, &best), best.cost)),

@@ -205,6 +205,8 @@ impl Objective<'_> {
             }
         }
         let sets = self.sets();
+        // A correction knows the squares of the errors, not their losses.
+        let corrects = cuts.affine && self.is_sum_of_squares();
         let parts = in_batches(&jobs, |_, jobs| parts_by_output(jobs, sets))
             .map_err(|(job, error)| self.infeasible(jobs[job].experiment, error))?;
         drop(jobs);
@@ -215,7 +217,7 @@ impl Objective<'_> {
         for (e, (chained, segments)) in chained.into_iter().zip(&cuts.segments).enumerate() {
             let mut parts = parts.by_ref().take(segments.len());
             if let Some(chained) = chained {
-                of.push(found.chain(chained, (segments.len(), sets), parts, guess, cuts.affine));
+                of.push(found.chain(chained, (segments.len(), sets), parts, guess, corrects));
                 continue;
             }
             let Some(Part { cost, triangle: mut whole, .. }) = parts.next() else { continue };
@@ -386,21 +388,22 @@ impl Triangulation {
         self.moved > most * 2.0 * self.cost || self.by_output.iter().any(of_one)
     }
 
-    /// Joins the triangles of an experiment's segments, and returns the corrected borders.
+    /// Joins the triangles of an experiment's segments, and returns the corrected borders. What the borders are off the ends before them is rounding
+    /// where they are right; it is corrected all the same where that is exact (`corrects`).
     fn chain(
         &mut self,
         of: Chained<'_>,
         (segments, sets): (usize, usize),
         parts: impl Iterator<Item = PartByOutput>,
         guess: Option<&Borders>,
-        affine: bool,
+        corrects: bool,
     ) -> Vec<Reached> {
         let Job { experiment, scales, piece: Piece { slopes, .. }, .. } = of.whole;
         let (carried, seeds) = (of.carried, of.seeds.len());
         let begin = || slopes[..carried * scales.len()].to_vec();
         let chain = || Chain::new(carried, segments, begin(), &of.parameters, &scales);
         let mut chains: Vec<Chain<'_>> = (0..sets).map(|_| chain()).collect();
-        let right = guess.is_some_and(|guess| guess.right && !affine);
+        let right = guess.is_some_and(|guess| guess.right && !corrects);
         let mut corrected = vec![];
         let mut simulated = 0.0;
         for (s, part) in parts.enumerate() {

@@ -107,6 +107,11 @@ impl<'p> Objective<'p> {
         self.problem.settings.loss.as_deref().map(|loss| loss as &dyn Loss)
     }
 
+    /// Whether the cost is that of squares alone: without a loss, nor logarithms of variances.
+    pub(crate) fn is_sum_of_squares(&self) -> bool {
+        self.loss().is_none() && !self.sweep.predicts_variance()
+    }
+
     /// Whether the loss reduces the weight of large errors.
     pub(crate) fn is_robust(&self) -> bool {
         self.loss().is_some_and(|loss| loss.weight(1e3) < 1.0)

@@ -106,10 +106,16 @@ fn wide(unknowns: &[&Unknown]) -> String {
         listed(of.map(|unknown| unknown.name.as_str()))
     };
     let factor = |unknown: &&Unknown| unknown.unbounded().map_or(1.0, |(lower, upper)| (upper / lower).sqrt());
-    let factor = unknowns.iter().filter(|unknown| unknown.transform == Transform::Log).map(factor).fold(1.0, f64::max);
+    let logarithms = unknowns.iter().filter(|unknown| unknown.transform == Transform::Log);
+    let factors: Vec<String> = logarithms.map(factor).map(|factor| number(factor, 2).to_string()).collect();
+    let known = match &factors[..] {
+        [] => String::new(),
+        [one] => format!("is known to a factor of {one} only"),
+        several => format!("are known to factors of {} only", several.join(", ")),
+    };
     let said = [
         (names(Transform::Identity), "cannot be told from zero: an interval is wider than its value".to_owned()),
-        (names(Transform::Log), format!("is known to a factor of {} only", number(factor, 2))),
+        (names(Transform::Log), known),
     ];
     let said = said.into_iter().filter(|(names, _)| !names.is_empty()).map(|(names, what)| format!("{names} {what}"));
     said.collect::<Vec<_>>().join(", and ")
