@@ -211,8 +211,10 @@ impl<'a, M: Made> Fit<'a, M> {
     /// where these lead to nothing usable, nor to errors near the noise, from 32 starts, after 150 evaluations of each from the best four only. It says so; with
     /// `starts(1)` it does not, and with more than 20,000 samples (2,000 where the model does not run in vector registers) in stages only.
     ///
-    /// The first start is the declared one. The others are a Latin hypercube (McKay, Beckman and Conover, Technometrics 21
-    /// (1979) 239), the same in every run. Of each unknown they span
+    /// The first start is the declared one. Half of the others are a Latin hypercube (McKay, Beckman and Conover, Technometrics 21
+    /// (1979) 239), the same in every run. The rest are the best by their costs of 40 times as many places, half of which lie up to a factor of 100 off
+    /// where the list says 10, with those unknowns at their least squares that the predictions are affine in; places near a better one are left out.
+    /// Starts that are led by stages are a hypercube all. Of each unknown it spans
     /// - its prior, where it has one, cut off at its bounds;
     /// - else its bounds, if both are finite: evenly in the logarithm if that is estimated, or if the bounds have one sign and
     ///   span a decade;
@@ -222,7 +224,7 @@ impl<'a, M: Made> Fit<'a, M> {
     ///
     /// The searches advance together, in parallel lanes where the model is compiled and in threads; the result is the same
     /// for any number of threads. A search is stopped when it is still above the best minimum found after many times the
-    /// steps that those which found a minimum took.
+    /// steps that those which found a minimum took, unless it is that from the declared start.
     /// A time limit, a flag and a checkpoint hold for all searches together; an observer sees the best point so far.
     ///
     /// ```

@@ -105,7 +105,7 @@ pub(super) fn search_from_many(
     let comparison = Comparison::new(plain);
     let mut searches = Searches { plain, comparison, starts, runs, cycle, wide };
     if let Some(file) = &file {
-        // Written at once, so that a path that cannot be written is reported before the search.
+        // Written at once, so that a path that cannot be written is reported before the searches.
         progress::write(&searches, file)?;
     }
     searches.run(file.as_ref());
@@ -124,10 +124,10 @@ pub(super) fn search_from_many(
 fn starts(plain: &Objective<'_>, count: usize, wide: bool) -> (Vec<Vec<f64>>, u64) {
     let half = (count - 1) / 2;
     if half == 0 || plain.problem.settings.lead != Lead::Declared {
-        return (draw::starts(plain, count, draw::REACH), 0);
+        return (draw::starts(plain, count, draw::REACH, draw::SEED), 0);
     }
     let (best, evaluations) = screen::best(plain, half, wide);
-    let mut starts = draw::starts(plain, count - best.len(), draw::REACH);
+    let mut starts = draw::starts(plain, count - best.len(), draw::REACH, draw::SEED);
     starts.extend(best);
     (starts, evaluations)
 }

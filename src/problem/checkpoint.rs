@@ -44,7 +44,7 @@ struct Saved {
     solver: Box<RawValue>,
 }
 
-crate::format::format!("greybox checkpoint", 3);
+crate::format::format!("greybox checkpoint", 4);
 
 const OTHER: &str = "it belongs to another problem (other data, equations, constants, weighting, parameters or settings); \
                      delete it or name another file";

@@ -24,6 +24,13 @@ impl Control {
         self.deadline.is_some_and(|deadline| Instant::now() >= deadline)
     }
 
+    /// The same with a part of the time that is left.
+    pub fn for_part(&self, part: f64) -> Control {
+        let now = Instant::now();
+        let until = |deadline: Instant| now + deadline.saturating_duration_since(now).mul_f64(part);
+        Control { cancel: self.cancel.clone(), deadline: self.deadline.map(until) }
+    }
+
     /// What stopped it.
     pub fn reason(&self) -> &'static str {
         if self.expired() { "the time limit was over" } else { "the fit was cancelled" }
@@ -49,5 +56,8 @@ mod tests {
         let named = [&past, &later, &flag].map(|control| control.named(Outcome::Cancelled));
         assert_eq!(named, [Outcome::TimeLimit, Outcome::Cancelled, Outcome::Cancelled]);
         assert_eq!(past.named(Outcome::Exact), Outcome::Exact);
+        let left = later.for_part(0.25).deadline.unwrap() - Instant::now();
+        assert!(left <= Duration::from_secs(250) && left > Duration::from_secs(240), "{left:?}");
+        assert!(past.for_part(0.25).stops() && !Control::NEVER.for_part(0.25).stops());
     }
 }

@@ -4,6 +4,7 @@ mod affine;
 #[path = "../common/mod.rs"]
 mod common;
 mod crossed;
+mod exact_sensor;
 mod extended;
 mod given_noise;
 #[path = "../common/hardening.rs"]

@@ -60,14 +60,15 @@ impl Prewhitened {
     pub fn run(&self, kept: Vec<usize>, mut sums: Information, alone: &[Vec<f64>]) -> Option<LongRun> {
         let Prewhitened { count, window, root, w, a, innovations } = self;
         let n = a.nrows();
-        for score in alone {
-            // What recoloring makes the score of.
-            let row = (DMatrix::identity(n, n) - a) * w.transpose() * DVector::from_column_slice(score);
-            sums.absorb_row(row.as_slice(), 0.0);
-        }
         // Scores that sum to zero have moving sums that are smaller by their part of the record.
         let part = *window as f64 / count;
-        let sums = DMatrix::from_fn(n, n, |i, j| sums.at(i, j)) / (1.0 - part + part * part / 3.0).sqrt();
+        let smaller = (1.0 - part + part * part / 3.0).sqrt();
+        for score in alone {
+            // What recoloring makes the score of.
+            let row = (DMatrix::identity(n, n) - a) * w.transpose() * DVector::from_column_slice(score) * smaller;
+            sums.absorb_row(row.as_slice(), 0.0);
+        }
+        let sums = DMatrix::from_fn(n, n, |i, j| sums.at(i, j)) / smaller;
         let recolor = (DMatrix::identity(n, n) - a).try_inverse()?;
         let finite = |m: &DMatrix<f64>| m.iter().all(|value| value.is_finite());
         let sound = finite(&sums) && finite(&recolor);

@@ -18,7 +18,7 @@ pub(crate) trait AccumulateScores: Send {
 /// The score of each sample in the columns kept: the sum over the outputs of `w psi(z) g` and, where variances `v` are predicted, of
 /// `w (psi(z) z - kappa) dv / (2 v)`. Each error is divided by the root of one less its leverage, with which the variance of
 /// independent errors is right (HC2). The error of a measurement that alone determines an unknown, such as the first one an initial state,
-/// is rounding and says nothing of its noise: it has no score, and its slopes are kept, by which its variance is that of the others.
+/// says little of its noise, and at a leverage of one nothing: it has no score, and its slopes are kept, by which its variance is that of the others.
 pub(crate) struct EachScore<'s, T> {
     objective: &'s Objective<'s>,
     experiment: usize,

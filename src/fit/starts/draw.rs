@@ -1,4 +1,4 @@
-//! The starts of the searches: a Latin hypercube in the scale of each unknown.
+//! Starts of searches, and places of which the best become starts: a Latin hypercube in the scale of each unknown.
 
 use crate::optimize::{LeastSquares, Linearization};
 use crate::parameter::{Parameter, Prior, Transform};
@@ -10,10 +10,10 @@ use statrs::distribution::{ContinuousCDF, Normal};
 pub(super) const REACH: f64 = 10.0;
 /// Bounds of one sign whose ratio is at least this are a range of magnitudes.
 const DECADE: f64 = 10.0;
-const SEED: u64 = 0x5354_4152_5453;
+pub(super) const SEED: u64 = 0x5354_4152_5453;
 
 /// The coordinates of `count` starts, the declared one first; those of unknowns without bounds or prior within a factor `reach` of it.
-pub(super) fn starts(plain: &Objective<'_>, count: usize, reach: f64) -> Vec<Vec<f64>> {
+pub(super) fn starts(plain: &Objective<'_>, count: usize, reach: f64, seed: u64) -> Vec<Vec<f64>> {
     let unknowns = &plain.problem.unknowns;
     let declared = unknowns.start();
     let others = count - 1;
@@ -25,7 +25,7 @@ pub(super) fn starts(plain: &Objective<'_>, count: usize, reach: f64) -> Vec<Vec
         if matches!(unknown.role, Role::InitialState(_)) && prior.is_none() && open {
             continue;
         }
-        let mut random = Random::stream(SEED, i as u64);
+        let mut random = Random::stream(seed, i as u64);
         for (start, part) in starts[1..].iter_mut().zip(strata(others, &mut random)) {
             let value = drawn(&unknown.parameter, part, sizes[i], reach);
             start[i] = transform.to_coordinate(value).max(bounds.0).min(bounds.1);
@@ -191,7 +191,7 @@ mod tests {
             let record = record(initial);
             let parameters = Curve { a: free(1.0), b: fixed(0.0), c: fixed(0.0) };
             let problem = Fit::new(&Decay, &record).parameters(parameters).noise(Level { x: 0.3 }).problem().unwrap();
-            let starts = starts(&problem.objective().unwrap(), 5, REACH);
+            let starts = starts(&problem.objective().unwrap(), 5, REACH, SEED);
             starts.iter().filter(|start| start[1] != 0.5).count()
         };
         assert_eq!(drawn(free(0.5)), 0);
