@@ -67,9 +67,12 @@ fn answer(units: Units, case: Case) -> Value {
     let deviance = estimate.deviance.take().map(|of| of - 2.0 * estimate.measurements as f64 * units.y.ln());
     let prediction = problem.predict(&estimate, &problem.records()[1]).unwrap();
     let deviance = deviance.map(|of| (of * 1e6).round());
+    let log_likelihood = estimate.log_likelihood.take().map(|of| of + estimate.measurements as f64 * units.y.ln());
+    let log_likelihood = log_likelihood.map(|of| (of * 1e6).round());
     let found = bands(&problem, &estimate, 1, 0.9).unwrap();
     json!({
         "deviance in millionths": deviance,
+        "log-likelihood in millionths": log_likelihood,
         "estimate": estimate,
         "identifiability": identifiability(&problem, &estimate).unwrap(),
         "profile": [profile(&problem, &estimate, "gain", 0.9).unwrap(), profile(&problem, &estimate, "tau", 0.9).unwrap()],
