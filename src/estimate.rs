@@ -75,8 +75,9 @@ pub struct Summary {
     /// `-2 ln` of the Gaussian likelihood of the (filtered) errors; not defined for weighted or robust fits.
     #[serde(with = "crate::real")]
     pub deviance: Option<f64>,
-    /// The logarithm of the likelihood. Where variances are predicted, a loss `rho(z)` stands for `z^2 / 2`, so that it is no longer that of a
-    /// distribution (CTSM prints the same); not defined for weighted fits and for other robust ones.
+    /// The logarithm of the likelihood, half the deviance with the sign changed; of a density per unit of the outputs, so that it depends on
+    /// these units. Where variances are predicted and there is a loss, `rho(z)` takes the place of `z^2 / 2`, as in CTSM (Kristensen, Madsen and Jørgensen,
+    /// Automatica 40 (2004) 225). Not defined for weighted fits, nor for robust fits without predicted variances.
     #[serde(with = "crate::real")]
     pub log_likelihood: Option<f64>,
     /// Trial steps of the search.

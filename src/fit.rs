@@ -214,7 +214,7 @@ impl<'a, M: Made> Fit<'a, M> {
     /// The first start is the declared one. Half of the others are a Latin hypercube (McKay, Beckman and Conover, Technometrics 21
     /// (1979) 239), the same in every run. The rest are the best by their costs of 40 times as many places, half of which lie up to a factor of 100 off
     /// where the list says 10, with those unknowns at their least squares that the predictions are affine in; places near a better one are left out.
-    /// Starts that are led by stages are a hypercube all. Of each unknown it spans
+    /// With stages, or with one or two starts, all others are of the hypercube. Of each unknown it spans
     /// - its prior, where it has one, cut off at its bounds;
     /// - else its bounds, if both are finite: evenly in the logarithm if that is estimated, or if the bounds have one sign and
     ///   span a decade;

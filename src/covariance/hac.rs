@@ -59,7 +59,7 @@ pub(crate) type First<'f> = (EachScore<'f, Lagged>, Option<Errors<'f>>);
 /// Its sums: of products of the scores over time and, but where variances are predicted, of the errors.
 pub(crate) struct Sums {
     count: usize,
-    /// The mean of the squared influences.
+    /// The mean square of the influences ([`EachScore::mean_square`]).
     mean_square: f64,
     triangle: Information,
     products: [DMatrix<f64>; 2],

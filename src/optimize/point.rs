@@ -15,7 +15,7 @@ pub(super) struct Point {
     pub gradient: Vec<f64>,
     pub norms: Vec<f64>,
     pub held: Vec<bool>,
-    /// Whose change by their own size moves the residual by less than its rounding: their gradient is rounding, too.
+    /// Unknowns whose change by their own size moves the residual by less than its rounding; their gradients are rounding, too.
     silent: Vec<bool>,
     /// How far each unknown may move, down and up.
     pub limits: Vec<(f64, f64)>,

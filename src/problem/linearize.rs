@@ -205,7 +205,7 @@ impl Objective<'_> {
             }
         }
         let sets = self.sets();
-        // A correction knows the squares of the errors, not their losses.
+        // The correction changes the sum of the squares; that of other losses cannot be corrected from triangles.
         let corrects = cuts.affine && self.is_sum_of_squares();
         let parts = in_batches(&jobs, |_, jobs| parts_by_output(jobs, sets))
             .map_err(|(job, error)| self.infeasible(jobs[job].experiment, error))?;
@@ -388,8 +388,8 @@ impl Triangulation {
         self.moved > most * 2.0 * self.cost || self.by_output.iter().any(of_one)
     }
 
-    /// Joins the triangles of an experiment's segments, and returns the corrected borders. What the borders are off the ends before them is rounding
-    /// where they are right; it is corrected all the same where that is exact (`corrects`).
+    /// Joins the triangles of an experiment's segments, and returns the corrected borders. Borders that are right differ from the ends of the segments
+    /// before them by rounding, which is corrected only where the correction is exact (`corrects`).
     fn chain(
         &mut self,
         of: Chained<'_>,

@@ -5,17 +5,18 @@ use greybox::estimate::CovarianceMethod;
 use greybox::*;
 
 signals! { pub struct Level { x: "V" } }
+signals! { pub struct Pair { x: "V", y: "V" } }
 signals! { pub struct Supply { u: "V" } }
 signals! { pub struct Lag { a: "1/s", b: "1/s", q: "V" } }
 
-/// `dx = (b u - a x) dt + q dw`, measured to a hundred-thousandth.
+/// `dx = (b u - a x) dt + q dw`, measured to a hundred-thousandth and by a second sensor to a half.
 #[derive(Clone)]
 struct Measured;
 
 impl Model for Measured {
     type State = Level;
     type Input = Supply;
-    type Output = Level;
+    type Output = Pair;
     type Parameters = Lag;
     fn derivative<S: Scalar>(&self, _t: S, x: &Level<S>, u: &Supply<S>, p: &Lag<S>) -> Level<S> {
         Level { x: p.b * u.u - p.a * x.x }
@@ -23,30 +24,32 @@ impl Model for Measured {
     fn diffusion<S: Scalar>(&self, _t: S, _x: &Level<S>, _u: &Supply<S>, p: &Lag<S>) -> Level<S> {
         Level { x: p.q }
     }
-    fn noise<S: Scalar>(&self, _t: S, _x: &Level<S>, _u: &Supply<S>, _p: &Lag<S>) -> Level<S> {
-        Level { x: S::from(1e-5) }
+    fn noise<S: Scalar>(&self, _t: S, _x: &Level<S>, _u: &Supply<S>, _p: &Lag<S>) -> Pair<S> {
+        Pair { x: S::from(1e-5), y: S::from(0.5) }
     }
-    fn output<S: Scalar>(&self, _t: S, x: &Level<S>, _u: &Supply<S>, _p: &Lag<S>) -> Level<S> {
-        *x
+    fn output<S: Scalar>(&self, _t: S, x: &Level<S>, _u: &Supply<S>, _p: &Lag<S>) -> Pair<S> {
+        Pair { x: x.x, y: x.x }
     }
 }
 
 const STEP: f64 = 0.25;
 
-/// The error of the first measurement is rounding, and says nothing of its noise, which is `R = q^2 (1 - exp(-2 a h)) / (2 a)` with a filter that begins with
-/// the diffusion of the first interval. With colored disturbances, with a loss and without, the standard error of the initial state is the root of it,
-/// and those of all others, and their degrees of freedom, are what they are if the initial state is known.
+/// A filter that begins with the diffusion of the first interval predicts the first measurement with the variance `q^2 (1 - exp(-2 a h)) / (2 a)`; the error is rounding.
+/// With colored disturbances, with a loss and without, the standard error of the initial state is the root of that variance. Other standard errors and
+/// their degrees of freedom are those with the initial state known. The second sensor is read at every tenth sample.
 #[test]
 fn an_initial_state_that_one_measurement_determines() {
-    let (mut noise, mut x, mut before) = (Noise(5), 1.0, 0.0);
+    let (mut noise, mut x, mut before, mut sample) = (Noise(5), 1.0, 0.0, 0);
     let inputs: Vec<Supply> = levels(4_000, 20, 3).into_iter().map(|u| Supply { u }).collect();
     let mut seen = |u: &Supply| {
-        let (now, next) = (Level { x }, 0.15 * noise.gauss());
+        let slow = if sample % 10 == 5 { x + 0.5 * noise.gauss() } else { f64::NAN };
+        sample += 1;
+        let (now, next) = (Pair { x, y: slow }, 0.15 * noise.gauss());
         x += STEP * (u.u - 0.4 * x) + next - 0.3 * before;
         before = next;
         now
     };
-    let outputs: Vec<Level> = inputs.iter().map(&mut seen).collect();
+    let outputs: Vec<Pair> = inputs.iter().map(&mut seen).collect();
     let record = Experiment::new(&Measured, Time::Uniform { start: 0.0, step: STEP }, inputs, outputs).unwrap();
     let parameters = Lag { a: free(0.5).log(), b: free(0.5).log(), q: free(0.5).log() };
     for loss in [false, true] {

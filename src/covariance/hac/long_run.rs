@@ -64,7 +64,7 @@ impl Prewhitened {
         let part = *window as f64 / count;
         let smaller = (1.0 - part + part * part / 3.0).sqrt();
         for score in alone {
-            // What recoloring makes the score of.
+            // The prewhitened row that recoloring and the division below turn back into the score.
             let row = (DMatrix::identity(n, n) - a) * w.transpose() * DVector::from_column_slice(score) * smaller;
             sums.absorb_row(row.as_slice(), 0.0);
         }

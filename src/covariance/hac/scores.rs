@@ -17,8 +17,8 @@ pub(crate) trait AccumulateScores: Send {
 
 /// The score of each sample in the columns kept: the sum over the outputs of `w psi(z) g` and, where variances `v` are predicted, of
 /// `w (psi(z) z - kappa) dv / (2 v)`. Each error is divided by the root of one less its leverage, with which the variance of
-/// independent errors is right (HC2). The error of a measurement that alone determines an unknown, such as the first one an initial state,
-/// says little of its noise, and at a leverage of one nothing: it has no score, and its slopes are kept, by which its variance is that of the others.
+/// independent errors is right (HC2). A measurement that alone determines an unknown, as the first one may determine an initial state, has an
+/// error of next to zero whatever its noise. It has no score here; its slopes are kept ([`EachScore::alone`]).
 pub(crate) struct EachScore<'s, T> {
     objective: &'s Objective<'s>,
     experiment: usize,
@@ -45,13 +45,14 @@ impl<'s, T> EachScore<'s, T> {
         EachScore { objective, experiment, kept, inverse, slopes, score, alone: vec![], squares: [0.0; 2], into }
     }
 
-    /// Their scores, of the variance that the others have on average.
+    /// The scores of the measurements that alone determine an unknown, of which nothing but the mean square of the others is known. Each is a row of the
+    /// columns kept.
     pub fn alone(&self, mean_square: f64) -> Vec<Vec<f64>> {
         let size = mean_square.sqrt();
         self.alone.iter().map(|row| row.iter().map(|slope| slope * size).collect()).collect()
     }
 
-    /// The mean of the squared influences.
+    /// The mean square of the influences of the other measurements.
     pub fn mean_square(&self) -> f64 {
         let [sum, count] = self.squares;
         sum / count.max(1.0)
@@ -77,7 +78,7 @@ impl<T: AccumulateScores> Accumulate for EachScore<'_, T> {
                         *score += psi * self.slopes[c];
                     }
                     self.squares[0] += weight * influence * influence / less;
-                    self.squares[1] += f64::from(weight > 0.0);
+                    self.squares[1] += f64::from(weight > 0.0 && window.is_measured(k, j, lane));
                 } else {
                     self.alone.push(self.kept.iter().map(|&c| weight.sqrt() * self.slopes[c]).collect());
                 }

@@ -15,16 +15,16 @@ const ROUNDING: f64 = 1e-8;
 const NEAR: f64 = 0.1;
 /// The part of a time limit that places may take.
 const PART: f64 = 0.25;
-/// With more unknowns than this, second derivatives are not looked at: the pairs would cost as much as the searches.
+/// With more unknowns than this, none are taken as affine: second derivatives of all pairs would cost as much as the searches.
 const MOST: usize = 50;
 /// Places that are evaluated before limits are looked at again.
 const AT_ONCE: usize = 64;
 
-/// A place, and what a search from it would begin with.
+/// A place from which a search may begin, and the cost there.
 struct Candidate {
     place: Vec<f64>,
     cost: f64,
-    /// Of each unknown that was drawn and is not affine, the part of the places where it is smaller.
+    /// For each unknown that differs between the places and is not affine: the fraction of the places in which it is smaller.
     ranks: Vec<f64>,
 }
 
@@ -64,7 +64,7 @@ impl Candidate {
     }
 }
 
-/// The ranks of each place.
+/// The ranks of each place ([`Candidate::ranks`]).
 fn ranks(places: &[Vec<f64>], affine: &[bool]) -> Vec<Vec<f64>> {
     let mut ranks = vec![vec![]; places.len()];
     for unknown in (0..affine.len()).filter(|i| !affine[*i]) {
@@ -101,7 +101,7 @@ fn at_least_squares(plain: &Objective<'_>, place: &[f64], linear: &Linearization
     (moved.zip(bounds).map(inside).collect(), linear.cost - linear.predicted_reduction(&step))
 }
 
-/// Which unknowns the predictions are affine in, all of them together, as far as second derivatives here tell, and the evaluations that it took.
+/// A set of unknowns in which the predictions are jointly affine, by their second derivatives at `x`, and the evaluations that it took.
 fn affine(plain: &Objective<'_>, x: &[f64]) -> (Vec<bool>, u64) {
     let mut found = vec![false; x.len()];
     if x.len() > MOST {
