@@ -4,6 +4,8 @@ use super::job::Job;
 use super::standardize::Standardize;
 use crate::record::Time;
 use crate::sweep::{Piece, Reached, RunError, Window};
+#[cfg(feature = "parallel")]
+use std::sync::{Mutex, PoisonError};
 
 /// The lane whose piece was not run to its end, and why.
 pub(super) struct Broken {
@@ -106,8 +108,20 @@ pub(super) fn ends(jobs: &[&Job<'_>]) -> Vec<Result<Reached, RunError>> {
 pub(crate) fn each<T: Send>(n: usize, f: impl Fn(usize) -> T + Send + Sync) -> Vec<T> {
     #[cfg(feature = "parallel")]
     if n > 1 {
-        use rayon::prelude::*;
-        return (0..n).into_par_iter().map(f).collect();
+        let results: Vec<Mutex<Option<T>>> = (0..n).map(|_| Mutex::new(None)).collect();
+        in_parallel(n, &|i| {
+            let result = f(i);
+            *results[i].lock().unwrap_or_else(PoisonError::into_inner) = Some(result);
+        });
+        let taken = results.into_iter().map(|result| result.into_inner().unwrap_or_else(PoisonError::into_inner));
+        return taken.flatten().collect();
     }
     (0..n).map(f).collect()
+}
+
+/// Compiled once, and not for each of the library's many closures.
+#[cfg(feature = "parallel")]
+fn in_parallel(n: usize, f: &(dyn Fn(usize) + Sync)) {
+    use rayon::prelude::*;
+    (0..n).into_par_iter().for_each(f);
 }
