@@ -11,9 +11,13 @@ if [ ! -d "$here/node_modules/axe-core" ] || [ ! -d "$here/node_modules/playwrig
   command -v npm > /dev/null || skip 'there is no npm to fetch axe-core and playwright-core with'
   npm ci --silent --no-audit --no-fund --prefix "$here" || skip 'npm could not fetch axe-core and playwright-core'
 fi
-for report in "$@"; do
-  case "$report" in
-    */index.html) timeout 300 node "$here/sheet.mjs" "$report" ;;
-    *) timeout 300 node "$here/check.mjs" "$report" ;;
+check() {
+  case "$1" in
+    */index.html) timeout 300 node "$here/sheet.mjs" "$1" ;;
+    *) timeout 300 node "$here/check.mjs" "$1" ;;
   esac
-done
+}
+export -f check
+export here
+# Two at a time: a page waits for its browser for more than half of the time.
+printf '%s\0' "$@" | xargs -0 -n 1 -P 2 bash -c 'check "$1"' _
