@@ -250,4 +250,44 @@ mod tests {
             assert!((best[0][2] - 0.7).abs() < 0.1, "{best:?}");
         }
     }
+
+    signals! { struct Waves { a: "A", b: "A", c: "A", d: "A", v: "rad/s", w: "rad/s" } }
+
+    /// Two waves.
+    #[derive(Clone)]
+    struct Two;
+
+    impl Model for Two {
+        type State = Nothing;
+        type Input = Voltage;
+        type Output = Current;
+        type Parameters = Waves;
+        const KIND: Kind = Kind::Static;
+        fn output<S: Scalar>(&self, t: S, _x: &Nothing, _u: &Voltage<S>, p: &Waves<S>) -> Current<S> {
+            let (one, other) = (p.v * t, p.w * t);
+            Current { i: p.a * one.sin() + p.b * one.cos() + p.c * other.sin() + p.d * other.cos() }
+        }
+    }
+
+    /// Of two frequencies thirty times too small, both are found to half a period over the record; no place drawn has both.
+    #[test]
+    fn two_frequencies_are_found_one_after_the_other() {
+        let wave = |t: f64| (0.9 * t).sin() + 0.8 * (2.1 * t).cos();
+        let outputs = (0..400).map(|k| Current { i: wave(0.25 * f64::from(k)) }).collect();
+        let inputs = vec![Voltage { u: 0.0 }; 400];
+        let record = Experiment::new(&Two, Time::Uniform { start: 0.0, step: 0.25 }, inputs, outputs).unwrap();
+        let one = free(1.0);
+        let parameters = Waves { a: one, b: one, c: one, d: one, v: free(0.03), w: free(0.07) };
+        let problem = Fit::new(&Two, &record).parameters(parameters).problem().unwrap();
+        let plain = problem.objective().unwrap();
+        let half_a_period = std::f64::consts::PI / 100.0;
+        let is_right = |place: &Vec<f64>| {
+            let (low, high) = (place[4].min(place[5]), place[4].max(place[5]));
+            (low - 0.9).abs() < half_a_period && (high - 2.1).abs() < half_a_period
+        };
+        let (best, _) = best(&plain, 9, true);
+        assert!(is_right(&best[0]), "{best:?}");
+        let drawn = |(times, reach, seed)| draw::starts(&plain, 1 + times * 9, reach, seed).split_off(1);
+        assert!(!DRAWN.into_iter().flat_map(drawn).any(|place| is_right(&place)));
+    }
 }
