@@ -119,7 +119,7 @@ pub(crate) fn each<T: Send>(n: usize, f: impl Fn(usize) -> T + Send + Sync) -> V
     (0..n).map(f).collect()
 }
 
-/// Compiled once, and not for each of the library's many closures.
+/// Not generic: threads of rayon for each closure of the library would be a tenth of its machine code.
 #[cfg(feature = "parallel")]
 fn in_parallel(n: usize, f: &(dyn Fn(usize) + Sync)) {
     use rayon::prelude::*;

@@ -19,5 +19,6 @@ check() {
 }
 export -f check
 export here
-# Two at a time: a page waits for its browser for more than half of the time.
+[ $# -gt 0 ] || exit 0
+# Two at a time take two thirds of the time.
 printf '%s\0' "$@" | xargs -0 -n 1 -P 2 bash -c 'check "$1"' _

@@ -6,18 +6,20 @@ use crate::problem::{Control, Objective, each};
 
 /// How many places are drawn for each start, how far they lie from the declared start at most, as a factor, and the seed.
 const DRAWN: [(usize, f64, u64); 2] = [(20, draw::REACH, draw::SEED + 1), (20, 100.0, draw::SEED + 2)];
-/// So many of the best places are changed in one unknown after the other, each to about as many values in all as places were drawn. Of two
-/// periods, the second is found once the first is right. Of searches for nine problems of NIST from 360 starts ten and a hundred times
-/// off, 314 are right without places, 338 with those drawn, 359 with changed ones; of the 40 for two periods (ENSO) 5, 19 and 40.
+/// So many of the best places are changed in one unknown after the other, with about as many evaluations for each as places were drawn. So the
+/// second of two periods is found once the first is right. Of `starts(20)` for nine problems of NIST from 360 starts ten and a hundred
+/// times off, 314 end right without places, 338 with 40 drawn for each start, 359 with these changes; for two periods (ENSO) 5, 19 and 40
+/// of 40. These starts were used to choose the numbers; of 540 others, 537 end right, for two periods 60 of 60.
 const CHANGED: usize = 4;
 /// Second derivatives below this part of the slopes and errors, for changes of the unknowns by their size, are rounding.
 const ROUNDING: f64 = 1e-8;
-/// Places are near each other if no unknown differs by more than this part of what was drawn for it, by rank. Near ones would lead to one
-/// minimum, and say no more of it than one does.
+/// Places are near each other if no unknown's rank among its drawn values differs by this part of them. Searches from near places would end
+/// in one minimum.
 const NEAR: f64 = 0.1;
 /// The part of a time limit that places may take.
 const PART: f64 = 0.25;
-/// With more unknowns than this, none are taken as affine: second derivatives of all pairs would cost as much as the searches.
+/// With more unknowns than this, none are taken as affine, since second derivatives of all pairs would cost as much as the searches, and none
+/// are changed one after the other, since each would get a few values only.
 const MOST: usize = 50;
 /// Places that are evaluated before limits are looked at again.
 const AT_ONCE: usize = 64;
@@ -26,7 +28,7 @@ const AT_ONCE: usize = 64;
 #[derive(Clone)]
 struct Place {
     at: Vec<f64>,
-    /// For each unknown that varies: the fraction of the places drawn in which it is smaller.
+    /// For each unknown of [`orders`], the part of the drawn values that are smaller than its own.
     ranks: Vec<f64>,
 }
 
@@ -42,6 +44,7 @@ struct Screen<'a> {
     plain: &'a Objective<'a>,
     /// The unknowns that are put to their least squares at each place.
     affine: Vec<bool>,
+    /// Whether places are evaluated in lanes.
     wide: bool,
     control: Control,
     evaluations: u64,
@@ -59,7 +62,7 @@ pub(super) fn best(plain: &Objective<'_>, count: usize, wide: bool) -> (Vec<Vec<
     let control = plain.control.for_part(PART);
     let mut screen = Screen { plain, affine, wide, control, evaluations, candidates: vec![] };
     screen.evaluate(ranked(&drawn, &orders));
-    if orders.len() > 1 {
+    if (2..=MOST).contains(&orders.len()) {
         for leader in screen.apart(CHANGED) {
             screen.change_each(leader, &drawn, &orders);
         }
@@ -67,7 +70,7 @@ pub(super) fn best(plain: &Objective<'_>, count: usize, wide: bool) -> (Vec<Vec<
     (screen.apart(count).into_iter().map(|candidate| candidate.place.at).collect(), screen.evaluations)
 }
 
-/// The unknowns that differ between places and are not affine, each with the places in the order of its values.
+/// For each unknown that is not affine and differs between the places drawn: its index, and the places in ascending order of its value.
 fn orders(drawn: &[Vec<f64>], affine: &[bool]) -> Vec<(usize, Vec<usize>)> {
     let order = |unknown: usize| {
         let mut order: Vec<usize> = (0..drawn.len()).collect();
@@ -78,6 +81,7 @@ fn orders(drawn: &[Vec<f64>], affine: &[bool]) -> Vec<(usize, Vec<usize>)> {
     (0..affine.len()).filter(|i| !affine[*i]).filter_map(order).collect()
 }
 
+/// The places drawn, with their ranks.
 fn ranked(drawn: &[Vec<f64>], orders: &[(usize, Vec<usize>)]) -> Vec<Place> {
     let mut places: Vec<Place> = drawn.iter().map(|at| Place { at: at.clone(), ranks: vec![] }).collect();
     for (_, order) in orders {
@@ -95,31 +99,29 @@ impl Screen<'_> {
             }
             self.evaluations += places.len() as u64;
             let found = self.evaluated(places);
-            self.candidates.extend(found.into_iter().flatten());
+            self.candidates.extend(found);
         }
     }
 
-    /// Where a search from each place would begin, and the cost there; `None` where it cannot be evaluated.
-    fn evaluated(&self, places: &[Place]) -> Vec<Option<Candidate>> {
-        if !self.affine.contains(&true) {
-            let cost = |i: usize| self.plain.cost_at(&places[i].at).ok().filter(|cost| cost.is_finite());
-            let costs = each(places.len(), cost);
-            return places
-                .iter()
-                .zip(costs)
-                .map(|(place, cost)| Some(Candidate { place: place.clone(), cost: cost? }))
-                .collect();
-        }
-        let points: Vec<_> = places.iter().map(|place| (self.plain, &place.at[..])).collect();
-        let found = places.iter().zip(linearized(&points, self.wide));
-        let projected = |(place, linear): (&Place, Answer)| {
-            let (at, cost) = at_least_squares(self.plain, &place.at, &linear.ok()?, &self.affine);
+    /// The places with their affine unknowns at the least squares, without those that cannot be evaluated.
+    fn evaluated(&self, places: &[Place]) -> Vec<Candidate> {
+        let found: Vec<Option<(Vec<f64>, f64)>> = if self.affine.contains(&true) {
+            let points: Vec<_> = places.iter().map(|place| (self.plain, &place.at[..])).collect();
+            let project = |(place, linear): (&Place, Answer)| {
+                Some(at_least_squares(self.plain, &place.at, &linear.ok()?, &self.affine))
+            };
+            places.iter().zip(linearized(&points, self.wide)).map(project).collect()
+        } else {
+            each(places.len(), |i| Some((places[i].at.clone(), self.plain.cost_at(&places[i].at).ok()?)))
+        };
+        let candidate = |(place, found): (&Place, Option<(Vec<f64>, f64)>)| {
+            let (at, cost) = found.filter(|(_, cost)| cost.is_finite())?;
             Some(Candidate { place: Place { at, ranks: place.ranks.clone() }, cost })
         };
-        found.map(projected).collect()
+        places.iter().zip(found).filter_map(candidate).collect()
     }
 
-    /// Changes one unknown of a place after the other, each to values of all that were drawn, and goes on from the best.
+    /// Changes one unknown after the other to some of its drawn values, evenly by rank, and keeps the best value before the next unknown.
     fn change_each(&mut self, mut best: Candidate, drawn: &[Vec<f64>], orders: &[(usize, Vec<usize>)]) {
         for (k, (unknown, order)) in orders.iter().enumerate() {
             let changed = order.iter().enumerate().step_by(orders.len()).map(|(rank, &i)| {
@@ -253,7 +255,7 @@ mod tests {
 
     signals! { struct Waves { a: "A", b: "A", c: "A", d: "A", v: "rad/s", w: "rad/s" } }
 
-    /// Two waves.
+    /// `a sin(v t) + b cos(v t) + c sin(w t) + d cos(w t)`.
     #[derive(Clone)]
     struct Two;
 
@@ -269,7 +271,7 @@ mod tests {
         }
     }
 
-    /// Of two frequencies thirty times too small, both are found to half a period over the record; no place drawn has both.
+    /// Two frequencies start thirty times too small. The best place has both right to half a period over the record; no place drawn has.
     #[test]
     fn two_frequencies_are_found_one_after_the_other() {
         let wave = |t: f64| (0.9 * t).sin() + 0.8 * (2.1 * t).cos();
