@@ -1,4 +1,4 @@
-//! [`Functions`]: a model's equations on vectors whose lengths are known at run time only.
+//! [`Functions`]: a model's equations on vectors whose lengths are known at run time only, and [`Sloped`]: their slopes.
 
 use crate::layout::{Kind, Layout};
 use crate::model::Model;
@@ -37,67 +37,86 @@ pub trait Functions<S>: Send + Sync {
     /// The state after a sample, as [`Model::jump`].
     fn jump(&self, t: S, x: &[S], u: &[S], p: &[S], to: &mut [S]);
 
-    /// The slopes of [`state`](Functions::state) with respect to the states, row by row: unless written, by secants, which are exact of
-    /// functions that are affine.
-    fn state_slopes(&self, t: S, x: &[S], u: &[S], p: &[S], to: &mut [S])
-    where
-        S: Scalar,
-    {
-        secants(x.len(), to, &|x, to| self.state(t, x, u, p, to));
+    /// Slopes and moments where they are known.
+    fn known(&self) -> Option<&dyn Sloped<S>> {
+        None
     }
+}
+
+/// Slopes and moments of a model's equations.
+pub trait Sloped<S> {
+    /// The slopes of [`state`](Functions::state) with respect to the states, row by row.
+    fn state_slopes(&self, t: S, x: &[S], u: &[S], p: &[S], to: &mut [S]);
 
     /// Those of the outputs.
-    fn output_slopes(&self, t: S, x: &[S], u: &[S], p: &[S], to: &mut [S])
-    where
-        S: Scalar,
-    {
-        secants(x.len(), to, &|x, to| self.output(t, x, u, p, to));
-    }
+    fn output_slopes(&self, t: S, x: &[S], u: &[S], p: &[S], to: &mut [S]);
 
     /// Those of the state after a sample.
-    fn jump_slopes(&self, t: S, x: &[S], u: &[S], p: &[S], to: &mut [S])
-    where
-        S: Scalar,
-    {
-        secants(x.len(), to, &|x, to| self.jump(t, x, u, p, to));
-    }
+    fn jump_slopes(&self, t: S, x: &[S], u: &[S], p: &[S], to: &mut [S]);
 
-    /// Moments of [`state`](Functions::state) where the state is Gaussian, its covariance after its mean in `carry`: unless written, those of
-    /// functions that are affine.
-    fn state_moments(&self, t: S, carry: &[S], u: &[S], p: &[S], layout: &Layout) -> Moments<S>
-    where
-        S: Scalar,
-    {
-        let n = layout.states.len();
-        let (mut mean, mut slopes) = (vec![S::from(0.0); n], vec![S::from(0.0); n * n]);
-        self.state(t, &carry[..n], u, p, &mut mean);
-        self.state_slopes(t, &carry[..n], u, p, &mut slopes);
-        Moments { mean, slopes, spread: vec![] }
-    }
+    /// Moments of [`state`](Functions::state) where the state is Gaussian, its covariance after its mean in `carry`.
+    fn state_moments(&self, t: S, carry: &[S], u: &[S], p: &[S], layout: &Layout) -> Moments<S>;
 
     /// Those of the outputs.
-    fn output_moments(&self, t: S, carry: &[S], u: &[S], p: &[S], layout: &Layout) -> Moments<S>
-    where
-        S: Scalar,
-    {
-        let (n, outputs) = (layout.states.len(), layout.outputs.len());
-        let (mut mean, mut slopes) = (vec![S::from(0.0); outputs], vec![S::from(0.0); outputs * n]);
-        self.output(t, &carry[..n], u, p, &mut mean);
-        self.output_slopes(t, &carry[..n], u, p, &mut slopes);
-        Moments { mean, slopes, spread: vec![] }
-    }
+    fn output_moments(&self, t: S, carry: &[S], u: &[S], p: &[S], layout: &Layout) -> Moments<S>;
 
     /// Those of the state after a sample.
-    fn jump_moments(&self, t: S, carry: &[S], u: &[S], p: &[S], layout: &Layout) -> Moments<S>
-    where
-        S: Scalar,
-    {
-        let n = layout.states.len();
-        let (mut mean, mut slopes) = (vec![S::from(0.0); n], vec![S::from(0.0); n * n]);
-        self.jump(t, &carry[..n], u, p, &mut mean);
-        self.jump_slopes(t, &carry[..n], u, p, &mut slopes);
-        Moments { mean, slopes, spread: vec![] }
+    fn jump_moments(&self, t: S, carry: &[S], u: &[S], p: &[S], layout: &Layout) -> Moments<S>;
+}
+
+/// Slopes and moments, where they are not known those of affine functions, by secants. Compiled once for all models.
+impl<S: Scalar> dyn Functions<S> + '_ {
+    pub fn state_slopes(&self, t: S, x: &[S], u: &[S], p: &[S], to: &mut [S]) {
+        match self.known() {
+            Some(known) => known.state_slopes(t, x, u, p, to),
+            None => secants(x.len(), to, &|x, to| self.state(t, x, u, p, to)),
+        }
     }
+
+    pub fn output_slopes(&self, t: S, x: &[S], u: &[S], p: &[S], to: &mut [S]) {
+        match self.known() {
+            Some(known) => known.output_slopes(t, x, u, p, to),
+            None => secants(x.len(), to, &|x, to| self.output(t, x, u, p, to)),
+        }
+    }
+
+    pub fn jump_slopes(&self, t: S, x: &[S], u: &[S], p: &[S], to: &mut [S]) {
+        match self.known() {
+            Some(known) => known.jump_slopes(t, x, u, p, to),
+            None => secants(x.len(), to, &|x, to| self.jump(t, x, u, p, to)),
+        }
+    }
+
+    pub fn state_moments(&self, t: S, carry: &[S], u: &[S], p: &[S], layout: &Layout) -> Moments<S> {
+        let n = layout.states.len();
+        self.known().map_or_else(
+            || affine(&carry[..n], n, |x, to| self.state(t, x, u, p, to)),
+            |known| known.state_moments(t, carry, u, p, layout),
+        )
+    }
+
+    pub fn output_moments(&self, t: S, carry: &[S], u: &[S], p: &[S], layout: &Layout) -> Moments<S> {
+        self.known().map_or_else(
+            || affine(&carry[..layout.states.len()], layout.outputs.len(), |x, to| self.output(t, x, u, p, to)),
+            |known| known.output_moments(t, carry, u, p, layout),
+        )
+    }
+
+    pub fn jump_moments(&self, t: S, carry: &[S], u: &[S], p: &[S], layout: &Layout) -> Moments<S> {
+        let n = layout.states.len();
+        self.known().map_or_else(
+            || affine(&carry[..n], n, |x, to| self.jump(t, x, u, p, to)),
+            |known| known.jump_moments(t, carry, u, p, layout),
+        )
+    }
+}
+
+/// The moments of an affine function, which has as many values as this, about a state.
+fn affine<S: Scalar>(x: &[S], values: usize, f: impl Fn(&[S], &mut [S])) -> Moments<S> {
+    let (mut mean, mut slopes) = (vec![S::from(0.0); values], vec![S::from(0.0); values * x.len()]);
+    f(x, &mut mean);
+    secants(x.len(), &mut slopes, &f);
+    Moments { mean, slopes, spread: vec![] }
 }
 
 /// The dead times of the inputs, none of those that are not late; empty where none is.

@@ -1,9 +1,10 @@
 //! [`FailureSearch`]: the cause of a simulation that fails, found in plain numbers.
 
 use crate::error::Failure;
-use crate::functions::{Functions, delays};
+use crate::functions::{Functions, Sloped, delays};
 use crate::integrate::{Duals, Method, Stuck};
 use crate::layout::Layout;
+use crate::moments::Moments;
 use crate::predict::{Between, Intervals, Plant, SlicePlant};
 use crate::record::{NO_DEAD_TIME, Record, is_dead_time};
 use core::sync::atomic::{AtomicBool, Ordering};
@@ -193,8 +194,34 @@ impl Functions<f64> for Watched<'_> {
         self.values.jump(t, x, u, p, to);
     }
 
-    // Not by secants, whose states are large.
+    fn known(&self) -> Option<&dyn Sloped<f64>> {
+        Some(self)
+    }
+}
+
+/// Of the equations themselves: secants ask at states so large that they count as run away.
+impl Sloped<f64> for Watched<'_> {
     fn state_slopes(&self, t: f64, x: &[f64], u: &[f64], p: &[f64], to: &mut [f64]) {
         self.values.state_slopes(t, x, u, p, to);
+    }
+
+    fn output_slopes(&self, t: f64, x: &[f64], u: &[f64], p: &[f64], to: &mut [f64]) {
+        self.values.output_slopes(t, x, u, p, to);
+    }
+
+    fn jump_slopes(&self, t: f64, x: &[f64], u: &[f64], p: &[f64], to: &mut [f64]) {
+        self.values.jump_slopes(t, x, u, p, to);
+    }
+
+    fn state_moments(&self, t: f64, carry: &[f64], u: &[f64], p: &[f64], layout: &Layout) -> Moments<f64> {
+        self.values.state_moments(t, carry, u, p, layout)
+    }
+
+    fn output_moments(&self, t: f64, carry: &[f64], u: &[f64], p: &[f64], layout: &Layout) -> Moments<f64> {
+        self.values.output_moments(t, carry, u, p, layout)
+    }
+
+    fn jump_moments(&self, t: f64, carry: &[f64], u: &[f64], p: &[f64], layout: &Layout) -> Moments<f64> {
+        self.values.jump_moments(t, carry, u, p, layout)
     }
 }

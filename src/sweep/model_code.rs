@@ -4,7 +4,7 @@ use super::filtered::Filter;
 use super::{Loops, Piece, Reached, RunError, Seed, Visit};
 use crate::dual::Dual;
 use crate::equations::{AllMoments, Equations, Slopes};
-use crate::functions::{Functions, Handle};
+use crate::functions::{Functions, Handle, Sloped};
 use crate::hash::hexadecimal;
 use crate::integrate::Duals;
 use crate::layout::{Kind, Layout};
@@ -169,22 +169,6 @@ impl<S: Scalar> Functions<S> for Evaluated {
         Functions::delay(&*self.equations, p, to);
     }
 
-    fn state_slopes(&self, t: S, x: &[S], u: &[S], p: &[S], to: &mut [S]) {
-        self.slopes().state.at(t, x, u, p, to);
-    }
-
-    fn output_slopes(&self, t: S, x: &[S], u: &[S], p: &[S], to: &mut [S]) {
-        self.slopes().output.at(t, x, u, p, to);
-    }
-
-    fn state_moments(&self, t: S, carry: &[S], u: &[S], p: &[S], _layout: &Layout) -> Moments<S> {
-        self.moments().state.at(t, carry, u, p)
-    }
-
-    fn output_moments(&self, t: S, carry: &[S], u: &[S], p: &[S], _layout: &Layout) -> Moments<S> {
-        self.moments().output.at(t, carry, u, p)
-    }
-
     fn jumps(&self) -> bool {
         Functions::<S>::jumps(&*self.equations)
     }
@@ -193,8 +177,30 @@ impl<S: Scalar> Functions<S> for Evaluated {
         self.equations.jump(t, x, u, p, to);
     }
 
+    fn known(&self) -> Option<&dyn Sloped<S>> {
+        Some(self)
+    }
+}
+
+impl<S: Scalar> Sloped<S> for Evaluated {
+    fn state_slopes(&self, t: S, x: &[S], u: &[S], p: &[S], to: &mut [S]) {
+        self.slopes().state.at(t, x, u, p, to);
+    }
+
+    fn output_slopes(&self, t: S, x: &[S], u: &[S], p: &[S], to: &mut [S]) {
+        self.slopes().output.at(t, x, u, p, to);
+    }
+
     fn jump_slopes(&self, t: S, x: &[S], u: &[S], p: &[S], to: &mut [S]) {
         self.slopes().jump.at(t, x, u, p, to);
+    }
+
+    fn state_moments(&self, t: S, carry: &[S], u: &[S], p: &[S], _layout: &Layout) -> Moments<S> {
+        self.moments().state.at(t, carry, u, p)
+    }
+
+    fn output_moments(&self, t: S, carry: &[S], u: &[S], p: &[S], _layout: &Layout) -> Moments<S> {
+        self.moments().output.at(t, carry, u, p)
     }
 
     fn jump_moments(&self, t: S, carry: &[S], u: &[S], p: &[S], _layout: &Layout) -> Moments<S> {
