@@ -25,6 +25,15 @@ proptest! {
         prop_assert_eq!(check::derivatives(&PositioningLoop::EMPS, 0.0, &x, &Reference { qg: q + e }, &AXIS), Ok(()));
     }
 
+    // Where friction turns over within 5e-4 m/s, steps of 6e-6 are too long for central differences.
+    #[test]
+    fn slopes_of_the_axis_about_standstill(v in -1e-3..1e-3, vir in -5.0..5.0) {
+        for v in [v, 0.0] {
+            let slopes = check::derivatives(&Positioning::EMPS, 0.0, &AxisMotion { q: 0.1, v }, &Command { vir }, &AXIS);
+            prop_assert_eq!(slopes, Ok(()));
+        }
+    }
+
     // Electrical power = copper loss + change of the field's energy + mechanical power; what friction and load leave of
     // that accelerates the rotor. A dozen roundings: 1e-12 of the largest term.
     #[test]
