@@ -186,6 +186,11 @@ impl Unknowns {
         self.row.iter().zip(coordinates).map(|(u, &c)| u.parameter.transform.to_value(c)).collect()
     }
 
+    /// Whether all values that were declared positive are.
+    pub fn are_meant(&self, values: impl Iterator<Item = f64>) -> bool {
+        self.row.iter().zip(values).all(|(u, value)| !u.parameter.positive || value > 0.0)
+    }
+
     /// Initial state and parameters of one experiment; of states that follow from the parameters, that of the start.
     pub fn of_experiment(&self, experiment: usize, coordinates: &[f64]) -> Values {
         let start = |known: &[Parameter]| known.iter().map(|p| p.start).collect::<Vec<f64>>();

@@ -184,9 +184,21 @@ pub(super) fn found(
     // A search that found no minimum is the best only if it is lower by more than rounding.
     let best =
         order.iter().copied().find(minimum).filter(|&i| comparison.ratio(level(i), level(lowest)) <= 1.0 + SAME_COST);
-    let best = best.unwrap_or(lowest);
+    let mut best = best.unwrap_or(lowest);
     let ended = order.iter().filter(|i| minimum(i)).filter_map(|&i| Some((i, found[i].as_ref()?)));
-    let kinds = kinds(&comparison, ended);
+    let mut kinds = kinds(&comparison, ended);
+    // Of minima with the same cost, such as mirror images, one whose values have the signs that were declared comes first.
+    let meant = |kind: &Kind<'_>| {
+        let unknowns = &plain.problem.unknowns;
+        unknowns.are_meant(unknowns.values(&kind.first.search.coordinates).into_iter())
+    };
+    let as_good = |kind: &Kind<'_>| kinds[0].first.costs_as_much_as(kind.first, &comparison);
+    if let Some(place) = kinds.iter().position(|kind| as_good(kind) && meant(kind))
+        && kinds[0].searches.contains(&best)
+    {
+        kinds[..=place].rotate_right(1);
+        best = kinds[0].searches[0];
+    }
     let of_best = kinds.iter().find(|kind| kind.searches.contains(&best));
     let best = of_best.map_or(best, |kind| kind.searches[0]);
     let agreed = of_best.map_or(0, |kind| kind.searches.len()) as u64;

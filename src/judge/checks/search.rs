@@ -56,14 +56,23 @@ fn checkpoint(evidence: &Evidence<'_>) -> Option<Warning> {
 /// Searches from other starts, if there were any.
 fn starts(evidence: &Evidence<'_>) -> Vec<Warning> {
     let asked = matches!(evidence.point.objective.problem.settings.searches, SearchPlan::All(_));
-    let of = |starts| warnings(starts, evidence.residuals.measured, asked, evidence.color_dominates());
+    let unknowns = &evidence.point.objective.problem.unknowns;
+    let meant = |minimum: &Minimum| unknowns.are_meant(minimum.unknowns.iter().map(|(_, value)| *value));
+    let of = |starts| warnings(starts, evidence.residuals.measured, asked, evidence.color_dominates(), &meant);
     evidence.point.end.starts.as_ref().map_or(vec![], of)
 }
 
 /// Warnings about an estimate that is the best end of these searches, with errors that are colored or not. Where searches were not asked
 /// for, a minimum that is found once lowers the verdict no more than one that is found without other searches does. But one that is found
 /// once by many searches and leaves colored errors is seldom the right one: what is colored there is what the model does not explain.
-fn warnings(starts: &Starts, measurements: u64, asked: bool, colored: bool) -> Vec<Warning> {
+/// Minima that are not meant, since they contradict what was declared, are no rivals.
+fn warnings(
+    starts: &Starts,
+    measurements: u64,
+    asked: bool,
+    colored: bool,
+    meant: &dyn Fn(&Minimum) -> bool,
+) -> Vec<Warning> {
     let Starts { tried, agreed, minima, declared, failed, .. } = starts;
     let mut warnings = vec![];
     if *agreed == 1 && *tried > 1 {
@@ -84,7 +93,7 @@ fn warnings(starts: &Starts, measurements: u64, asked: bool, colored: bool) -> V
         places.collect::<Vec<_>>().join(", ")
     };
     let rival = |minimum: &&Minimum| measurements as f64 * minimum.cost_ratio.ln() < INDISTINGUISHABLE;
-    if let Some(rival) = minima.iter().skip(1).find(rival).filter(|_| *agreed > 0) {
+    if let Some(rival) = minima.iter().skip(1).filter(|minimum| meant(minimum)).find(rival).filter(|_| *agreed > 0) {
         let text = format!(
             "another minimum explains the data as well, with {}, at {}: bounds or a prior must tell which one is meant",
             times_the_cost(rival.cost_ratio),
@@ -172,11 +181,14 @@ mod tests {
         let minimum = |cost_ratio| Minimum { cost_ratio, searches: 1, undetermined: vec![], unknowns: vec![] };
         let minima = vec![minimum(1.0), minimum(rival)];
         let starts = Starts { tried, agreed, minima, declared: Some(declared), failed: vec![], evaluations: 1 };
-        warnings(&starts, 100, true, false).iter().map(|warning| warning.code).collect()
+        warnings(&starts, 100, true, false, &|minimum| minimum.cost_ratio != 1.001)
+            .iter()
+            .map(|warning| warning.code)
+            .collect()
     }
 
     /// A deviance of `100 ln(ratio)` above 10 is another: at a ratio of 1.1052. A minimum found by one of several searches, and
-    /// a declared start that leads elsewhere, are said.
+    /// a declared start that leads elsewhere, are said; a minimum that is not meant, here that of a ratio of 1.001, is no rival.
     #[test]
     fn what_is_said_of_searches() {
         use WarningCode::{DeclaredStartElsewhere, MinimumFoundOnce, RivalMinimum};
@@ -186,6 +198,7 @@ mod tests {
         assert_eq!(codes(1, 1, 1.106, 0), []);
         assert_eq!(codes(8, 3, 1.106, 1), [DeclaredStartElsewhere]);
         assert_eq!(codes(8, 0, 1.104, 0), []);
+        assert_eq!(codes(8, 3, 1.001, 0), []);
     }
 
     /// A minimum that one of eight searches led to is not usable where it leaves colored errors. Where it leaves white ones, or one of
@@ -196,7 +209,7 @@ mod tests {
             let minimum = Minimum { cost_ratio: 1.0, searches: agreed, undetermined: vec![], unknowns: vec![] };
             let starts =
                 Starts { tried, agreed, minima: vec![minimum], declared: None, failed: vec![], evaluations: 1 };
-            warnings(&starts, 100, asked, colored)
+            warnings(&starts, 100, asked, colored, &|_| true)
         };
         let text = &said(8, 1, true, false)[0].text;
         assert!(

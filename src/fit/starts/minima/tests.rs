@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::tests::{Current, Gain, Line, Voltage};
-use crate::{Experiment, Fit, Time, free};
+use crate::{Experiment, Fit, Kind, Model, Nothing, Parameter, Scalar, Time, free};
 
 const MINIMUM: Outcome = Outcome::Converged { step: 0.0, gradient: 0.0 };
 const LIMIT: Outcome = Outcome::IterationLimit { iterations: 9 };
@@ -10,11 +10,20 @@ const LIMIT: Outcome = Outcome::IterationLimit { iterations: 9 };
 /// The results of searches that ended at these gains, of eight measurements whose sum of squares is `8 + 800 (a - 2)^2`, in units of
 /// the noise.
 fn ended(ends: &[Option<(f64, Outcome)>]) -> (usize, Starts) {
+    ended_by(&Line, free(1.0), ends)
+}
+
+/// Those of another model with the same outputs at a gain of two.
+fn ended_by(
+    model: &(impl Model<State = Nothing, Input = Voltage, Output = Current, Parameters = Gain> + Clone),
+    declared: Parameter,
+    ends: &[Option<(f64, Outcome)>],
+) -> (usize, Starts) {
     let inputs: Vec<Voltage> = (0..8).map(|k| Voltage { u: f64::from(1 - 2 * (k % 2)) }).collect();
     let error = |k: usize| if (k / 2).is_multiple_of(2) { 0.1 } else { -0.1 };
     let outputs = inputs.iter().enumerate().map(|(k, u)| Current { i: 2.0 * u.u + error(k) }).collect();
-    let record = Experiment::new(&Line, Time::Uniform { start: 0.0, step: 1.0 }, inputs, outputs).unwrap();
-    let fit = Fit::new(&Line, &record).parameters(Gain { a: free(1.0) }).noise(Current { i: 0.1 });
+    let record = Experiment::new(model, Time::Uniform { start: 0.0, step: 1.0 }, inputs, outputs).unwrap();
+    let fit = Fit::new(model, &record).parameters(Gain { a: declared }).noise(Current { i: 0.1 });
     let problem = fit.problem().unwrap();
     let plain = problem.objective().unwrap();
     let end = |(a, outcome): &(f64, Outcome)| SearchEnd {
@@ -71,6 +80,31 @@ fn ends_that_are_one_minimum() {
     assert_eq!(agreed([(2.003, rough(1e-3)), (2.0, MINIMUM)]), (2, 1, Some(0)));
     assert_eq!(agreed([(2.0, rough(1e-3)), (2.003, MINIMUM)]), (2, 1, Some(0)));
     assert_eq!(agreed([(2.004, rough(1e-2)), (2.0, MINIMUM)]), (1, 2, Some(1)));
+}
+
+/// Of a minimum and its mirror image, which cost the same, that of the declared sign is the best; a lower cost of the other one decides.
+#[test]
+fn a_mirror_image_of_the_wrong_sign() {
+    #[derive(Clone)]
+    struct Square;
+    impl Model for Square {
+        type State = Nothing;
+        type Input = Voltage;
+        type Output = Current;
+        type Parameters = Gain;
+        const KIND: Kind = Kind::Static;
+        fn output<S: Scalar>(&self, _t: S, _x: &Nothing, u: &Voltage<S>, p: &Gain<S>) -> Current<S> {
+            Current { i: p.a * p.a * u.u * 0.5 }
+        }
+    }
+    let ends = [-2.0, 2.0, -2.0, 2.1].map(|a| Some((a, MINIMUM)));
+    let (best, starts) = ended_by(&Square, free(1.0).positive(), &ends);
+    assert_eq!((best, starts.agreed, starts.declared), (1, 1, Some(1)));
+    let gains: Vec<f64> = starts.minima.iter().map(|minimum| minimum.unknowns[0].1).collect();
+    assert_eq!(gains, [2.0, -2.0, 2.1]);
+    assert_eq!((starts.minima[0].cost_ratio, starts.minima[1].cost_ratio), (1.0, 1.0));
+    assert_eq!(ended_by(&Square, free(1.0), &ends).0, 0);
+    assert_eq!(ended_by(&Square, free(1.0).positive(), &ends[2..]).0, 0);
 }
 
 /// A tenth of a standard deviation, and a millionth of the unknowns' effect.
