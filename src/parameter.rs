@@ -95,7 +95,8 @@ impl Parameter {
     }
 
     /// Declares that only a positive value has a meaning (a resistance, a mass, a friction), from physics. The search is not
-    /// bounded: data that lead it to zero or below contradict the model, and the estimate is then not usable.
+    /// bounded: data that lead it to zero or below contradict the model, and the estimate is then not usable. Of minima of the same cost, such as
+    /// mirror images, one is taken where it is positive.
     pub fn positive(self) -> Self {
         Parameter { positive: true, ..self }
     }
