@@ -77,8 +77,8 @@ pub fn loss(loss: &dyn Loss) -> Result<(), Disagreement> {
 }
 
 /// Whether the slopes of a model's functions are those of its values, at one point (time in s): duals against central
-/// differences, to 1e-6 of each slope, in steps of 6e-6 of a variable (of one, if zero), and in steps a hundred and ten thousand times shorter
-/// where a function bends so much that those are too long. At a kink or a jump they differ by nature.
+/// differences, to 1e-6 of each slope. The step is 6e-6 of a variable (of one, if zero); where that is too long for the curvature of a function,
+/// steps a hundred and ten thousand times shorter, as far as rounding allows. At a kink or a jump they differ by nature.
 ///
 /// # Errors
 /// The first [`Disagreement`].
@@ -109,7 +109,7 @@ pub fn derivatives<M: Model>(
     at.compare::<M::Output>("output", &|x, u, p| model.output(t, x, u, p), &|x, u, p| model.output(t.into(), x, u, p))
 }
 
-/// Shorter steps, as parts of a variable.
+/// Shorter steps, as parts of a variable: the error of a central difference falls as the square of the step.
 const SHORTER: [f64; 2] = [6e-8, 6e-10];
 
 /// Columns of a Jacobian per evaluation.
@@ -156,18 +156,19 @@ impl<M: Model> Point<M> {
                 let largest = row.iter().enumerate().fold(values[i].abs(), |m, (j, s)| m.max((s * size(j)).abs()));
                 for (j, numeric) in row.iter().enumerate().skip(from).take(COLUMNS) {
                     let exact = dual.slopes[j - from];
-                    let close = |numeric: f64| {
-                        (exact - numeric).abs() * size(j) <= 1e-6 * (exact * size(j)).abs() + 1e-8 * largest
-                    };
-                    let shorter = |step: f64| {
-                        let ends = [-step, step].map(|step| {
+                    let tolerance = 1e-6 * (exact * size(j)).abs() + 1e-8 * largest;
+                    let close = |numeric: f64| (exact - numeric).abs() * size(j) <= tolerance;
+                    // A step that is lost in rounding would confirm a slope of zero.
+                    let confirms = |step: &f64| {
+                        let [(from, low), (to, high)] = [-step, *step].map(|step| {
                             let mut v = at.clone();
                             v[j] += step * size(j);
                             (v[j], of_vector(&v)[i])
                         });
-                        (ends[1].1 - ends[0].1) / (ends[1].0 - ends[0].0)
+                        let told = low != high && f64::EPSILON * values[i].abs() <= step * tolerance;
+                        told && close((high - low) / (to - from))
                     };
-                    if !close(*numeric) && !SHORTER.iter().any(|step| close(shorter(*step))) {
+                    if !close(*numeric) && !SHORTER.iter().any(confirms) {
                         let (quantity, variable) = (R::NAMES[i], names[j]);
                         return Err(Disagreement::Slope { function, quantity, variable, exact, numeric: *numeric });
                     }

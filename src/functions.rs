@@ -37,7 +37,7 @@ pub trait Functions<S>: Send + Sync {
     /// The state after a sample, as [`Model::jump`].
     fn jump(&self, t: S, x: &[S], u: &[S], p: &[S], to: &mut [S]);
 
-    /// Slopes and moments where they are known.
+    /// Slopes and moments where they are known otherwise than by secants.
     fn known(&self) -> Option<&dyn Sloped<S>> {
         None
     }
@@ -64,7 +64,8 @@ pub trait Sloped<S> {
     fn jump_moments(&self, t: S, carry: &[S], u: &[S], p: &[S], layout: &Layout) -> Moments<S>;
 }
 
-/// Slopes and moments, where they are not known those of affine functions, by secants. Compiled once for all models.
+/// Slopes and moments: those that are known; else those of an affine function, by secants, which are exact. As methods of the trait object they
+/// are compiled once, not for each model.
 impl<S: Scalar> dyn Functions<S> + '_ {
     pub fn state_slopes(&self, t: S, x: &[S], u: &[S], p: &[S], to: &mut [S]) {
         match self.known() {

@@ -186,8 +186,8 @@ impl Unknowns {
         self.row.iter().zip(coordinates).map(|(u, &c)| u.parameter.transform.to_value(c)).collect()
     }
 
-    /// Whether all values that were declared positive are.
-    pub fn are_meant(&self, values: impl Iterator<Item = f64>) -> bool {
+    /// Whether the values of all unknowns that were declared positive are positive.
+    pub fn have_declared_signs(&self, values: impl IntoIterator<Item = f64>) -> bool {
         self.row.iter().zip(values).all(|(u, value)| !u.parameter.positive || value > 0.0)
     }
 

@@ -176,6 +176,34 @@ fn lost_slopes_are_found() {
     assert_relative_eq!(numeric, -0.75, max_relative = 1e-8);
 }
 
+/// Of slopes that were lost, the changes are below rounding in the shorter steps: of a value that is hardly moved, and of one that is a
+/// difference of large numbers.
+#[test]
+fn lost_slopes_are_found_where_shorter_steps_are_lost_in_rounding() {
+    #[derive(Clone, Copy)]
+    struct Weak(fn(f64) -> f64);
+    impl Model for Weak {
+        type State = State;
+        type Input = Force;
+        type Output = Place;
+        type Parameters = Spring;
+        fn derivative<S: Scalar>(&self, _t: S, x: &State<S>, _u: &Force<S>, _p: &Spring<S>) -> State<S> {
+            *x
+        }
+        fn output<S: Scalar>(&self, _t: S, _x: &State<S>, _u: &Force<S>, p: &Spring<S>) -> Place<S> {
+            Place { y: (self.0)(p.k.value()).into() }
+        }
+    }
+    for (f, slope) in [(Weak(|k| 1.0 + 5e-8 * k), 5e-8), (Weak(|k| (1e8 + k) - 1e8), 1.0)] {
+        let (x, p) = (State { x: 1.0, v: 1.0 }, Spring { m: 2.0, k: 1.0, d: 1.0 });
+        let why = check::derivatives(&f, 0.0, &x, &Force { u: 3.0 }, &p).unwrap_err();
+        let Disagreement::Slope { variable, exact, numeric, .. } = why else { panic!("{why}") };
+        assert_eq!((variable, exact), ("k", 0.0));
+        // The second value moves in steps of 1.5e-8, of which a difference over 1.2e-5 is off by one or two.
+        assert_relative_eq!(numeric, slope, max_relative = 3e-3);
+    }
+}
+
 /// A function that is not a number, with slopes that are not, agrees with nothing.
 #[test]
 fn what_is_not_a_number_is_not_confirmed() {

@@ -187,13 +187,14 @@ pub(super) fn found(
     let mut best = best.unwrap_or(lowest);
     let ended = order.iter().filter(|i| minimum(i)).filter_map(|&i| Some((i, found[i].as_ref()?)));
     let mut kinds = kinds(&comparison, ended);
+    let (names, values) = (plain.names(), |x: &[f64]| plain.problem.unknowns.values(x));
     // Of minima with the same cost, such as mirror images, one whose values have the signs that were declared comes first.
-    let meant = |kind: &Kind<'_>| {
-        let unknowns = &plain.problem.unknowns;
-        unknowns.are_meant(unknowns.values(&kind.first.search.coordinates).into_iter())
+    let has_signs = |kind: &Kind<'_>| {
+        let end = found[kind.searches[0]].as_ref();
+        end.is_some_and(|end| plain.problem.unknowns.have_declared_signs(values(&end.search.coordinates)))
     };
     let as_good = |kind: &Kind<'_>| kinds[0].first.costs_as_much_as(kind.first, &comparison);
-    if let Some(place) = kinds.iter().position(|kind| as_good(kind) && meant(kind))
+    if let Some(place) = kinds.iter().position(|kind| as_good(kind) && has_signs(kind))
         && kinds[0].searches.contains(&best)
     {
         kinds[..=place].rotate_right(1);
@@ -202,7 +203,6 @@ pub(super) fn found(
     let of_best = kinds.iter().find(|kind| kind.searches.contains(&best));
     let best = of_best.map_or(best, |kind| kind.searches[0]);
     let agreed = of_best.map_or(0, |kind| kind.searches.len()) as u64;
-    let (names, values) = (plain.names(), |x: &[f64]| plain.problem.unknowns.values(x));
     let named = |x: &[f64]| names.iter().cloned().zip(values(x)).collect::<Vec<_>>();
     let minima = kinds.iter().filter_map(|kind| {
         let end = found[kind.searches[0]].as_ref()?;

@@ -35,6 +35,9 @@ pub(crate) const CHECKPOINT: Check = Check::new(
 /// be better by more in less than `exp(-10 / 2)`, one of 150 records.
 pub(crate) const INDISTINGUISHABLE: f64 = 10.0;
 
+/// The largest ratio of the costs of a minimum and its mirror image, which differ by rounding and the tolerance of searches.
+const MIRRORED: f64 = 1.0 + 1e-6;
+
 /// A minimum that half of all searches lead to is found at most once by so many in less than one of twenty cases: `(8 + 1) / 2^8`.
 const MANY: u64 = 8;
 
@@ -57,21 +60,22 @@ fn checkpoint(evidence: &Evidence<'_>) -> Option<Warning> {
 fn starts(evidence: &Evidence<'_>) -> Vec<Warning> {
     let asked = matches!(evidence.point.objective.problem.settings.searches, SearchPlan::All(_));
     let unknowns = &evidence.point.objective.problem.unknowns;
-    let meant = |minimum: &Minimum| unknowns.are_meant(minimum.unknowns.iter().map(|(_, value)| *value));
-    let of = |starts| warnings(starts, evidence.residuals.measured, asked, evidence.color_dominates(), &meant);
+    let has_signs = |minimum: &Minimum| unknowns.have_declared_signs(minimum.unknowns.iter().map(|(_, value)| *value));
+    let of = |starts| warnings(starts, evidence.residuals.measured, asked, evidence.color_dominates(), &has_signs);
     evidence.point.end.starts.as_ref().map_or(vec![], of)
 }
 
 /// Warnings about an estimate that is the best end of these searches, with errors that are colored or not. Where searches were not asked
 /// for, a minimum that is found once lowers the verdict no more than one that is found without other searches does. But one that is found
 /// once by many searches and leaves colored errors is seldom the right one: what is colored there is what the model does not explain.
-/// Minima that are not meant, since they contradict what was declared, are no rivals.
+/// A mirror image of the estimate that does not have the declared signs, where the estimate has them, is no rival; another minimum is, since a
+/// value just below zero may be a small positive one.
 fn warnings(
     starts: &Starts,
     measurements: u64,
     asked: bool,
     colored: bool,
-    meant: &dyn Fn(&Minimum) -> bool,
+    has_signs: &dyn Fn(&Minimum) -> bool,
 ) -> Vec<Warning> {
     let Starts { tried, agreed, minima, declared, failed, .. } = starts;
     let mut warnings = vec![];
@@ -93,7 +97,9 @@ fn warnings(
         places.collect::<Vec<_>>().join(", ")
     };
     let rival = |minimum: &&Minimum| measurements as f64 * minimum.cost_ratio.ln() < INDISTINGUISHABLE;
-    if let Some(rival) = minima.iter().skip(1).filter(|minimum| meant(minimum)).find(rival).filter(|_| *agreed > 0) {
+    let signed = minima.first().is_some_and(has_signs);
+    let mirrored = |minimum: &Minimum| signed && minimum.cost_ratio <= MIRRORED && !has_signs(minimum);
+    if let Some(rival) = minima.iter().skip(1).filter(|one| !mirrored(one)).find(rival).filter(|_| *agreed > 0) {
         let text = format!(
             "another minimum explains the data as well, with {}, at {}: bounds or a prior must tell which one is meant",
             times_the_cost(rival.cost_ratio),
@@ -181,14 +187,12 @@ mod tests {
         let minimum = |cost_ratio| Minimum { cost_ratio, searches: 1, undetermined: vec![], unknowns: vec![] };
         let minima = vec![minimum(1.0), minimum(rival)];
         let starts = Starts { tried, agreed, minima, declared: Some(declared), failed: vec![], evaluations: 1 };
-        warnings(&starts, 100, true, false, &|minimum| minimum.cost_ratio != 1.001)
-            .iter()
-            .map(|warning| warning.code)
-            .collect()
+        let has_signs = |minimum: &Minimum| minimum.cost_ratio == 1.0;
+        warnings(&starts, 100, true, false, &has_signs).iter().map(|warning| warning.code).collect()
     }
 
     /// A deviance of `100 ln(ratio)` above 10 is another: at a ratio of 1.1052. A minimum found by one of several searches, and
-    /// a declared start that leads elsewhere, are said; a minimum that is not meant, here that of a ratio of 1.001, is no rival.
+    /// a declared start that leads elsewhere, are said. The other minimum does not have the declared signs: it is no rival where its cost is the same.
     #[test]
     fn what_is_said_of_searches() {
         use WarningCode::{DeclaredStartElsewhere, MinimumFoundOnce, RivalMinimum};
@@ -198,7 +202,8 @@ mod tests {
         assert_eq!(codes(1, 1, 1.106, 0), []);
         assert_eq!(codes(8, 3, 1.106, 1), [DeclaredStartElsewhere]);
         assert_eq!(codes(8, 0, 1.104, 0), []);
-        assert_eq!(codes(8, 3, 1.001, 0), []);
+        assert_eq!(codes(8, 3, 1.0 + 0.9e-6, 0), []);
+        assert_eq!(codes(8, 3, 1.0 + 1.1e-6, 0), [RivalMinimum]);
     }
 
     /// A minimum that one of eight searches led to is not usable where it leaves colored errors. Where it leaves white ones, or one of
