@@ -34,7 +34,7 @@ pub(crate) use batches::each;
 pub(crate) use checkpoint::CheckpointFile;
 pub(crate) use control::Control;
 pub(crate) use curvature::{Bend, curvatures_together};
-pub(crate) use finer::{Finer, FinerSweeps, MakeSweep, PARTS, SUBSTEPS};
+pub(crate) use finer::{Finer, FinerSweeps, PARTS, SUBSTEPS};
 pub(crate) use fingerprint::Fingerprint;
 pub use objective::Objective;
 pub(crate) use pass::{Accumulate, AccumulateLanes};
@@ -77,6 +77,8 @@ pub struct Problem<'a> {
     pub(crate) cuts: Cuts,
     /// Number of the method among those of a default fit: that which it begins with, or that was chosen, is 0.
     pub(crate) method: usize,
+    /// Steps per sample of a method that follows the default one; else one.
+    pub(crate) steps: usize,
     /// Whether the method was chosen by the library, which then answers for its step.
     pub(crate) refines: bool,
     pub(crate) finer: Option<Arc<dyn Finer + 'a>>,
@@ -130,7 +132,7 @@ impl<'a> Problem<'a> {
             _ => 1.0,
         };
         let cuts = Cuts::new(&*sweep, &records, settings.prefilter.is_some());
-        let (method, refines, finer) = (0, false, None);
+        let (method, steps, refines, finer) = (0, 1, false, None);
         Ok(Problem {
             sweep,
             records,
@@ -141,6 +143,7 @@ impl<'a> Problem<'a> {
             kappa,
             cuts,
             method,
+            steps,
             refines,
             finer,
         })

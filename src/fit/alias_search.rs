@@ -129,7 +129,7 @@ fn best(mut ends: Vec<End>, frequencies: &str, limits: Limits) -> Option<Summary
 mod tests {
     use super::super::refine::tests::answer;
     use super::*;
-    use crate::{Experiment, Fit, Model, Scalar, Time, free, signals, simulate};
+    use crate::{Experiment, Fit, Model, Rk4, Scalar, Simulator, Time, free, signals};
 
     const NONE: Limits = Limits { fewer: false, stop: false };
 
@@ -236,7 +236,8 @@ mod tests {
         let inputs: Vec<Force> = (0..60).map(|k| Force { f: f64::from(k * k % 7) - 3.0 }).collect();
         let time = Time::Uniform { start: 0.0, step: 0.4 };
         let initial = Motion { x: 0.0, v: 0.0 };
-        let exact = simulate(&Oscillator, &Spring { k: 49.0 }, &initial, time.clone(), &inputs).unwrap().outputs;
+        let simulator = Simulator::new(&Oscillator).integrator(Rk4::default());
+        let exact = simulator.run(&Spring { k: 49.0 }, &initial, time.clone(), &inputs).unwrap().outputs;
         let outputs =
             exact.iter().zip(0..).map(|(y, k)| Place { x: y.x + 1e-3 * (f64::from(k * k % 11) - 5.0) }).collect();
         let record = Experiment::new(&Oscillator, time, inputs, outputs).unwrap();

@@ -10,11 +10,11 @@ use crate::layout::{Kind, Layout};
 use crate::model::Model;
 use crate::parameter::Parameter;
 use crate::predict::{Prediction, Predictor, simulation};
-use crate::problem::{FinerSweeps, MakeSweep, SUBSTEPS};
+use crate::problem::{FinerSweeps, SUBSTEPS};
 use crate::record::Record;
 use crate::signals::{Of, Signals};
 use crate::sweep::{DualSweep, Loops, Narrow, Sweep, Typed, compiled, of_equations};
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 /// What can be fitted: a Rust [`Model`], [`Equations`] that are known at run time, or a [`Sweep`] of one's own behind an `Arc`.
 ///
@@ -60,6 +60,8 @@ impl Fittable for Arc<dyn Sweep + '_> {
 pub trait Made: Fittable {
     /// An integrator.
     type Stepping: Clone + Send + Sync;
+    /// Whether other methods follow its default one where it is continuous.
+    const REFINES: bool;
 
     fn layout(&self) -> Layout;
     /// What a fit that borrows it runs.
@@ -72,8 +74,9 @@ pub trait Made: Fittable {
     fn stepping(integrator: impl Integrator) -> Self::Stepping;
     /// The transition of equations that are linear with constant coefficients.
     fn exact(&self) -> Option<Self::Stepping>;
-    /// The methods that follow the default one, of what is continuous.
-    fn finer(&self) -> Vec<Self::Stepping>;
+    /// The methods that follow the default one, of what is continuous: [`exact`](Self::exact) where that `serves`, else ever shorter steps; and last one for
+    /// stiff models. Each after its steps per sample.
+    fn finer(&self, serves: bool) -> Vec<(usize, Self::Stepping)>;
     /// A sweep, by the default integrator and of the simulation error unless said otherwise.
     fn sweep<'a>(
         model: Handle<'a, Self>,
@@ -109,14 +112,27 @@ pub(super) fn finer<'a, M: Made + 'a>(
 where
     M::Stepping: 'a,
 {
-    if stepping.is_some() {
-        return FinerSweeps::new(vec![]);
+    if stepping.is_some() || !M::REFINES || model.layout().kind != Kind::Continuous {
+        return FinerSweeps::none();
     }
-    let by = |stepping: M::Stepping| -> MakeSweep<'a> {
-        let (model, predictor) = (model.clone(), predictor.cloned());
-        Arc::new(move || M::sweep(model.clone(), Some(&stepping), predictor.as_ref()))
-    };
-    FinerSweeps::new(model.finer().into_iter().map(by).collect())
+    let (predictor, methods) = (predictor.cloned(), OnceLock::new());
+    FinerSweeps::new(Arc::new(move |number| {
+        let all =
+            methods.get_or_init(|| model.finer(crosses(predictor.as_ref()) && model.layout().states.len() <= WIDEST));
+        let (steps, stepping) = all.get(number)?;
+        Some((*steps, M::sweep(model.clone(), Some(stepping), predictor.as_ref()).ok()?))
+    }))
+}
+
+/// Most states of equations whose transition is taken by itself: its matrices are full, and are made anew for each set of parameters.
+const WIDEST: usize = 32;
+
+/// The methods that follow a default one, each after its steps per sample.
+fn following<T>(exact: Option<T>, automatic: impl Fn(u32) -> T, stiff: T) -> Vec<(usize, T)> {
+    let by_steps = || SUBSTEPS.map(|steps| (steps as usize, automatic(steps))).into_iter().collect();
+    let mut methods: Vec<(usize, T)> = exact.map_or_else(by_steps, |exact| vec![(1, exact)]);
+    methods.push((1, stiff));
+    methods
 }
 
 /// A predictor.
@@ -142,6 +158,12 @@ fn predicting(chosen: Option<&Predicting>) -> Arc<dyn Prediction> {
 #[derive(Clone)]
 pub struct AnyStepping(Arc<dyn Method>);
 
+impl AnyStepping {
+    pub fn is_exact(&self) -> bool {
+        self.0.is_exact()
+    }
+}
+
 /// An integrator of a Rust model: compiled into the loop over a model's samples, and as a trait object.
 pub struct Stepping<M: Model> {
     loops: Arc<dyn Loops<M>>,
@@ -163,6 +185,7 @@ impl<M: Model> Clone for Stepping<M> {
 
 impl<M: Model> Made for M {
     type Stepping = Stepping<M>;
+    const REFINES: bool = true;
 
     fn layout(&self) -> Layout {
         Layout::of::<M>()
@@ -201,12 +224,9 @@ impl<M: Model> Made for M {
         Some(Stepping { method: exact(), ..Stepping::automatic(1) })
     }
 
-    fn finer(&self) -> Vec<Stepping<M>> {
-        if M::KIND != Kind::Continuous {
-            return vec![];
-        }
+    fn finer(&self, serves: bool) -> Vec<(usize, Stepping<M>)> {
         let stiff = Stepping { loops: Arc::new(Narrow(Stiff::default())), method: stiff() };
-        SUBSTEPS.map(Stepping::automatic).into_iter().chain([stiff]).collect()
+        following(serves.then(|| self.exact()).flatten(), Stepping::automatic, stiff)
     }
 
     /// A compiled program if the model can be traced, else dual numbers.
@@ -233,6 +253,7 @@ impl<M: Model> Made for M {
 
 impl Made for Equations {
     type Stepping = AnyStepping;
+    const REFINES: bool = true;
 
     fn layout(&self) -> Layout {
         self.layout().clone()
@@ -270,11 +291,9 @@ impl Made for Equations {
         self.linear().map(|_| AnyStepping(exact()))
     }
 
-    fn finer(&self) -> Vec<AnyStepping> {
-        match self.layout().kind {
-            Kind::Continuous => SUBSTEPS.map(automatic).into_iter().chain([stiff()]).map(AnyStepping).collect(),
-            Kind::Discrete | Kind::Static => vec![],
-        }
+    fn finer(&self, serves: bool) -> Vec<(usize, AnyStepping)> {
+        let exact = serves.then(|| self.exact()).flatten();
+        following(exact, |steps| AnyStepping(automatic(steps)), AnyStepping(stiff()))
     }
 
     fn sweep<'a>(
@@ -293,6 +312,7 @@ impl Made for Equations {
 
 impl Made for Arc<dyn Sweep + '_> {
     type Stepping = AnyStepping;
+    const REFINES: bool = false;
 
     fn layout(&self) -> Layout {
         (**self).layout().clone()
@@ -330,7 +350,7 @@ impl Made for Arc<dyn Sweep + '_> {
         None
     }
 
-    fn finer(&self) -> Vec<AnyStepping> {
+    fn finer(&self, _serves: bool) -> Vec<(usize, AnyStepping)> {
         vec![]
     }
 

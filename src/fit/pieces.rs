@@ -112,7 +112,7 @@ impl Problem<'_> {
         let pieces: Vec<Record> = begins.iter().zip(ends).map(piece).collect::<Result<_, _>>()?;
         let settings = self.settings.beside(self.settings.noise.clone());
         let problem = Problem::new(method.sweep.clone(), pieces, &self.unknowns.parameters, settings)?;
-        let problem = Problem { refines: self.refines, method: method.method, ..problem };
+        let problem = Problem { refines: self.refines, method: method.method, steps: method.steps, ..problem };
         let of = |i: usize| {
             let unknown = &problem.unknowns.row[i];
             let known = unknown.experiment.map(|piece| &begins[piece]);

@@ -17,8 +17,9 @@ const ROUGH: f64 = 1e-3;
 impl Fit<'_, Equations> {
     /// Simulates the equations with the starts of the parameters, by the integrator, from an initial state in the order of the layout, as
     /// [`Simulator`](crate::Simulator) does a Rust model by the same one; the records and other settings of the fit are not used. Where no integrator
-    /// was chosen, steps of Runge and Kutta become finer until the outputs change by less than a part of 1e-6 of their size, or finer ones bring them no
-    /// nearer, and implicit steps follow where none are fine enough. `inputs` is a record of the inputs, with their holds; its outputs, if it has any, are not read. Gives it with the simulated
+    /// was chosen, linear equations with constant coefficients cross each interval exactly where one step of Runge and Kutta is not near that; of others,
+    /// steps become finer until the outputs change by less than a part of 1e-6 of their size, or finer ones bring them no nearer, and implicit steps follow
+    /// where none are fine enough. `inputs` is a record of the inputs, with their holds; its outputs, if it has any, are not read. Gives it with the simulated
     /// outputs, to which [`Record::with_noise`] adds noise; its initial state is to be estimated.
     ///
     /// # Errors
@@ -31,15 +32,16 @@ impl Fit<'_, Equations> {
             Ok::<_, Error>(problem.in_units(&Control::NEVER).predict(0, &[])?.outputs)
         };
         let (mut outputs, mut before) = (by(self.stepping.as_ref()), f64::INFINITY);
-        let finer = if self.stepping.is_none() { self.model.finer() } else { vec![] };
-        for stepping in &finer {
+        let finer = if self.stepping.is_none() { self.model.finer(true) } else { vec![] };
+        for (_, stepping) in &finer {
             let again = by(Some(stepping));
             let change = outputs.as_ref().ok().zip(again.as_ref().ok()).map_or(f64::INFINITY, |(a, b)| change(a, b));
+            let is_exact = stepping.is_exact() && again.is_ok();
             if again.is_ok() || outputs.is_err() {
                 outputs = again;
             }
             // Of a model with jumps of its derivatives, and of outputs that are rounding, finer steps are no nearer.
-            if change <= NEAR || change <= ROUGH && change > 0.5 * before {
+            if is_exact || change <= NEAR || change <= ROUGH && change > 0.5 * before {
                 break;
             }
             before = change;

@@ -5,8 +5,11 @@ use crate::error::Error;
 use crate::sweep::Sweep;
 use std::sync::{Arc, OnceLock};
 
-/// Makes the sweep by a method.
-pub(crate) type MakeSweep<'a> = Arc<dyn Fn() -> Result<Arc<dyn Sweep + 'a>, Error> + Send + Sync + 'a>;
+/// A sweep by a method, after the steps per sample that this takes; one, where it chooses them.
+pub(crate) type Made<'a> = (usize, Arc<dyn Sweep + 'a>);
+
+/// Makes the sweep by a method, numbered from the first one that follows the default one; `None` after the last.
+pub(crate) type MakeSweep<'a> = Arc<dyn Fn(usize) -> Option<Made<'a>> + Send + Sync + 'a>;
 
 /// A problem by finer methods.
 pub(crate) trait Finer: Send + Sync {
@@ -16,24 +19,28 @@ pub(crate) trait Finer: Send + Sync {
 
 /// Sweeps by finer and finer methods. Each is made when it is first needed, once for all problems that share these.
 pub(crate) struct FinerSweeps<'a> {
-    make: Vec<MakeSweep<'a>>,
-    made: Vec<OnceLock<Option<Arc<dyn Sweep + 'a>>>>,
+    make: Option<MakeSweep<'a>>,
+    made: [OnceLock<Option<Made<'a>>>; MOST],
 }
 
 impl<'a> FinerSweeps<'a> {
-    pub fn new(make: Vec<MakeSweep<'a>>) -> Arc<Self> {
-        let made = make.iter().map(|_| OnceLock::new()).collect();
-        Arc::new(FinerSweeps { make, made })
+    pub fn new(make: MakeSweep<'a>) -> Arc<Self> {
+        Arc::new(FinerSweeps { make: Some(make), made: Default::default() })
     }
 
-    fn get(&self, number: usize) -> Option<Arc<dyn Sweep + 'a>> {
-        let (make, made) = (self.make.get(number)?, self.made.get(number)?);
-        made.get_or_init(|| make().ok()).clone()
+    /// Of a method that was chosen, and of models that are not integrated.
+    pub fn none() -> Arc<Self> {
+        Arc::new(FinerSweeps { make: None, made: Default::default() })
+    }
+
+    fn get(&self, number: usize) -> Option<Made<'a>> {
+        let (make, made) = (self.make.as_ref()?, self.made.get(number)?);
+        made.get_or_init(|| make(number)).clone()
     }
 
     /// The sweep by the method of this number, as an estimate has it: from one on.
     pub fn by_number(&self, number: usize) -> Option<Arc<dyn Sweep + 'a>> {
-        self.get(number.checked_sub(1)?)
+        Some(self.get(number.checked_sub(1)?)?.1)
     }
 }
 
@@ -43,26 +50,28 @@ impl<'a> FinerSweeps<'a> {
 const TRIALS: u64 = 20;
 pub(crate) const PARTS: u64 = 5;
 
-/// Steps per sample of the methods that follow the default one; after them comes one for stiff models.
+/// Steps per sample of the methods that follow the default one, where intervals are not crossed exactly; after them comes one for stiff models.
 pub(crate) const SUBSTEPS: [u32; 4] = [4, 16, 64, 256];
+const MOST: usize = SUBSTEPS.len() + 1;
 
 /// The problem by each method is made when it is first needed.
 struct ByMethods<'a> {
     base: Problem<'a>,
     sweeps: Arc<FinerSweeps<'a>>,
-    made: Vec<OnceLock<Option<Problem<'a>>>>,
+    made: [OnceLock<Option<Problem<'a>>>; MOST],
 }
 
 impl Finer for ByMethods<'_> {
     fn by(&self, number: usize) -> Option<&Problem<'_>> {
-        self.made.get(number)?.get_or_init(|| self.base.with_sweep(self.sweeps.get(number)?, number + 1).ok()).as_ref()
+        let make = || self.base.with_sweep(self.sweeps.get(number)?, number + 1).ok();
+        self.made.get(number)?.get_or_init(make).as_ref()
     }
 }
 
 impl<'a> Problem<'a> {
     /// This problem with finer methods. A run continues with the next of them as long as a finer step would move an unknown.
     pub(crate) fn refining(self, sweeps: Arc<FinerSweeps<'a>>) -> Self {
-        if sweeps.make.is_empty() {
+        if sweeps.make.is_none() {
             return self;
         }
         // Prepared records and checkpoints depend on the method.
@@ -70,7 +79,7 @@ impl<'a> Problem<'a> {
         let optimizer = self.settings.optimizer.limited(trials);
         let settings = Settings { checkpoint: None, optimizer, ..self.settings.clone() };
         let base = Problem { prepared: vec![], refines: true, settings, ..self.clone() };
-        let made = sweeps.make.iter().map(|_| OnceLock::new()).collect();
+        let made = Default::default();
         Problem { refines: true, finer: Some(Arc::new(ByMethods { base, sweeps, made })), ..self }
     }
 
@@ -79,20 +88,15 @@ impl<'a> Problem<'a> {
         self.method > 0 && (most == TRIALS || most == TRIALS * PARTS)
     }
 
-    fn with_sweep(&self, sweep: Arc<dyn Sweep + 'a>, method: usize) -> Result<Self, Error> {
+    fn with_sweep(&self, (steps, sweep): Made<'a>, method: usize) -> Result<Self, Error> {
         let prepared = Problem::prepared(&*sweep, &self.records, &self.unknowns.parameters)?;
         let cuts = Cuts::new(&*sweep, &self.records, self.settings.prefilter.is_some());
-        Ok(Problem { sweep, prepared, cuts, method, ..self.clone() })
-    }
-
-    /// Steps per sample of its method, if that is one of those that follow the default one; else one.
-    pub(crate) fn steps(&self) -> usize {
-        self.method.checked_sub(1).and_then(|number| SUBSTEPS.get(number)).map_or(1, |steps| *steps as usize)
+        Ok(Problem { sweep, prepared, cuts, method, steps, ..self.clone() })
     }
 
     /// Steps of all samples; with many, compiling a program pays.
     pub(crate) fn all_steps(&self) -> usize {
-        self.samples() * self.steps()
+        self.samples() * self.steps
     }
 
     /// The problem by a finer method, numbered from the coarsest; `None` after the last.
@@ -112,10 +116,9 @@ impl<'a> Problem<'a> {
 }
 
 impl Objective<'_> {
-    /// Whether a finer step changes the cost at a point by a tenth; `None` if either cannot be evaluated there, or if there is
-    /// none.
+    /// Whether a finer step changes the cost at a point by a tenth; not where there is none. `None` if either cannot be evaluated there.
     pub(crate) fn step_decides(&self, coordinates: &[f64]) -> Option<bool> {
-        let finer = self.sweep.refined(self.problem.all_steps())?;
+        let Some(finer) = self.sweep.refined(self.problem.all_steps()) else { return Some(false) };
         let finer = self.of(self.problem, &*finer).cost_at(coordinates).ok()?;
         let this = self.cost_at(coordinates).ok()?;
         Some(differ(this, finer))
@@ -133,7 +136,7 @@ mod tests {
     use super::*;
     use crate::problem::SearchPlan;
     use crate::tests::{Current, Gain, Line, Voltage};
-    use crate::{Experiment, Fit, Model, Rk4, Scalar, Time, free};
+    use crate::{Experiment, Fit, Horizon, Model, Rk4, Scalar, Time, free};
 
     /// `di/dt = a u`.
     #[derive(Clone)]
@@ -154,21 +157,54 @@ mod tests {
         }
     }
 
-    /// Four finer steps and a method for stiff models follow the default method of a continuous model; nothing follows a
-    /// method that was chosen, and a static model has none.
+    /// `di/dt = -a i^2 + u`.
+    #[derive(Clone)]
+    struct Bent;
+
+    impl Model for Bent {
+        type State = Current;
+        type Input = Voltage;
+        type Output = Current;
+        type Parameters = Gain;
+
+        fn derivative<S: Scalar>(&self, _t: S, x: &Current<S>, u: &Voltage<S>, p: &Gain<S>) -> Current<S> {
+            Current { i: u.u - p.a * x.i * x.i }
+        }
+
+        fn output<S: Scalar>(&self, _t: S, x: &Current<S>, _u: &Voltage<S>, _p: &Gain<S>) -> Current<S> {
+            *x
+        }
+    }
+
+    /// The transition of linear equations follows the default method, or four finer steps, and a method for stiff models; nothing follows a method that
+    /// was chosen, a predictor that does not cross intervals exactly takes steps, and a static model has no method.
     #[test]
     fn what_follows_a_default_method() {
         let time = Time::Uniform { start: 0.0, step: 1.0 };
         let inputs = || vec![Voltage { u: 1.0 }; 4];
         let outputs = || (0..4).map(|k| Current { i: f64::from(k) }).collect::<Vec<_>>();
         let charge = Experiment::new(&Charge, time.clone(), inputs(), outputs()).unwrap();
-        let line = Experiment::new(&Line, time, inputs(), outputs()).unwrap();
+        let line = Experiment::new(&Line, time.clone(), inputs(), outputs()).unwrap();
         let gain = || Gain { a: free(1.0) };
-        let methods = |problem: &Problem<'_>| problem.by_method().count() - 1;
-        assert_eq!(methods(&Fit::new(&Charge, &charge).parameters(gain()).problem().unwrap()), 5);
+        let methods = |problem: &Problem<'_>| {
+            problem.by_method().skip(1).map(|finer| finer.sweep.integrator()).collect::<Vec<_>>()
+        };
+        let (exact, stiff) = (
+            "exact transition of linear equations",
+            "implicit Runge-Kutta 4(3), adaptive, relative 1e-8, absolute 1e-12",
+        );
+        assert_eq!(methods(&Fit::new(&Charge, &charge).parameters(gain()).problem().unwrap()), [exact, stiff]);
+        let bent = Experiment::new(&Bent, time.clone(), inputs(), outputs()).unwrap();
+        let by_steps = methods(&Fit::new(&Bent, &bent).parameters(gain()).problem().unwrap());
+        assert!(
+            by_steps.len() == 5 && by_steps[3] == "Runge-Kutta 4, 256 steps per sample" && by_steps[4] == stiff,
+            "{by_steps:?}"
+        );
+        let restarts = Fit::new(&Charge, &charge).parameters(gain()).predictor(Horizon { steps: 2, filter: None });
+        assert_eq!(methods(&restarts.problem().unwrap()).len(), 5);
         let chosen = Fit::new(&Charge, &charge).parameters(gain()).integrator(Rk4::default());
-        assert_eq!(methods(&chosen.problem().unwrap()), 0);
-        assert_eq!(methods(&Fit::new(&Line, &line).parameters(gain()).problem().unwrap()), 0);
+        assert!(methods(&chosen.problem().unwrap()).is_empty());
+        assert!(methods(&Fit::new(&Line, &line).parameters(gain()).problem().unwrap()).is_empty());
     }
 
     /// Searches by finer methods have 20 trial steps at a time, five times as many from several starts; a search that is limited more
@@ -180,7 +216,7 @@ mod tests {
         let record = Experiment::new(&Line, time, vec![Voltage { u: 1.0 }; 4], outputs).unwrap();
         let problem = Fit::new(&Line, &record).parameters(Gain { a: free(1.0) }).problem().unwrap();
         let made = problem.sweep.clone();
-        let sweeps = || FinerSweeps::new(vec![Arc::new(|| Ok(made.clone())) as MakeSweep<'_>]);
+        let sweeps = || FinerSweeps::new(Arc::new(|number| (number == 0).then(|| (4, made.clone()))));
         for (starts, trials) in [(1, 20), (2, 100)] {
             let settings = Settings { searches: SearchPlan::All(starts), ..problem.settings.clone() };
             let refined = Problem { settings, ..problem.clone() }.refining(sweeps());
@@ -190,6 +226,7 @@ mod tests {
             assert!(!refined.limits_search_to(trials));
             assert!(refined.finer(1).is_none() && refined.refines && refined.by_method().count() == 2);
             assert_eq!([0, 1, 2].map(|number| refined.by_number(number).method), [0, 1, 0]);
+            assert_eq!([0, 1].map(|number| refined.by_number(number).all_steps()), [4, 16]);
         }
         assert_eq!([0, 1, 2].map(|number| sweeps().by_number(number).is_some()), [false, true, false]);
     }

@@ -113,7 +113,7 @@ pub(crate) fn step_errors(all: &[Compared<'_>]) -> Vec<f64> {
     let mut sums = vec![Changes::default(); all.len()];
     let samples: usize = windows.iter().map(|(_, window)| window.range().len()).sum();
     // A program is worth its compilation by the steps that it takes.
-    let steps = all.first().map_or(0, |one| samples * one.objective.problem.steps());
+    let steps = all.first().map_or(0, |one| samples * one.objective.problem.steps);
     if let Some(finer) = all.first().and_then(|one| one.objective.sweep.refined(steps)) {
         let batches = batches(&*finer, all, &windows);
         let one = |b: usize| changes(&*finer, all, batches[b]);
@@ -157,7 +157,8 @@ fn batches<'w>(
     alike.flat_map(|alike| alike.chunks(finer.lanes(all[alike[0].0].record(), &[]).max(1))).collect()
 }
 
-/// The sum of squared standardized changes in each window of a batch, and its samples; zeros where it cannot be simulated.
+/// The sum of squared standardized changes in each window of a batch, and its samples. Where it cannot be simulated the change is infinite; zero with a method
+/// that chooses its steps, which may have come to the most of them.
 fn changes(finer: &dyn Sweep, all: &[Compared<'_>], windows: &[(usize, &Sampled)]) -> Vec<(f64, usize)> {
     let at = |i: &usize| {
         let Compared { objective, coordinates, experiment, .. } = all[*i];
@@ -183,9 +184,12 @@ fn changes(finer: &dyn Sweep, all: &[Compared<'_>], windows: &[(usize, &Sampled)
         }
         true
     });
-    let seen = |(piece, (found, reached)): (&Piece<'_>, (f64, &Result<_, _>))| {
-        if reached.is_ok() && found.is_finite() { (found, piece.samples.len()) } else { (0.0, 0) }
-    };
+    let seen =
+        |(piece, (found, reached)): (&Piece<'_>, (f64, &Result<_, _>))| match reached.is_ok() && found.is_finite() {
+            true => (found, piece.samples.len()),
+            false if finer.is_adaptive() => (0.0, 0),
+            false => (f64::INFINITY, piece.samples.len()),
+        };
     pieces.iter().zip(found.into_iter().zip(&reached)).map(seen).collect()
 }
 

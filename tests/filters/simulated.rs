@@ -8,7 +8,7 @@ const TRUTH: Building = Building { tau: 0.8, lose: 2.5, gain: 1.0, q: 0.4, r: 0.
 /// The state after one interval of `h` (s) from `x`, disturbed or not.
 fn after<const DISCRETE: bool>(h: f64, x: Walls, seed: Option<u64>) -> Walls {
     let model = Heated::<DISCRETE>;
-    let simulator = Simulator::new(&model);
+    let simulator = Simulator::new(&model).integrator(Automatic::default());
     let simulator = seed.map_or(simulator.clone(), |seed| simulator.disturbed(seed));
     let time = Time::Uniform { start: 0.0, step: h };
     simulator.run(&TRUTH, &x, time, &[Heat { u: 1.0 }; 2]).unwrap().states[1]

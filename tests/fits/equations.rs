@@ -101,10 +101,10 @@ fn equations_that_were_read_give_what_their_model_gives() {
 /// A default method, then three finer ones, then an implicit one.
 #[test]
 fn stiff_equations_take_the_method_that_their_model_takes() {
-    let (truth, record) = stiff::motor(1e4);
-    let expected = Fit::new(&stiff::Direct, &record).parameters(stiff::off(truth)).run().unwrap();
+    let (truth, record) = stiff::motor(&stiff::FANNED, 1e4);
+    let expected = Fit::new(&stiff::FANNED, &record).parameters(stiff::off(truth)).run().unwrap();
     let parameters = stiff::Motor::into_array(stiff::off(truth)).to_vec();
-    let problem = Fit::new(&read(&stiff::Direct), record.record()).parameters(parameters).problem().unwrap();
+    let problem = Fit::new(&read(&stiff::FANNED), record.record()).parameters(parameters).problem().unwrap();
     let found = problem.run().unwrap();
     assert!(found.method.integrator.contains("implicit"), "{found}");
     same(&found, &expected, 1e-10);

@@ -163,7 +163,7 @@ signals! { struct Road { height: "m" } }
 signals! { struct Measured { body: "m", wheel: "m" } }
 signals! { struct Suspension { spring: "N/m", damper: "N s/m", tire: "N/m", wheel: "kg" } }
 
-/// A quarter of a car: 300 kg on a wheel.
+/// A quarter of a car: 300 kg on a wheel. The force of the damper grows a little more than in proportion to speed.
 struct QuarterCar;
 
 impl Model for QuarterCar {
@@ -172,7 +172,8 @@ impl Model for QuarterCar {
     type Output = Measured;
     type Parameters = Suspension;
     fn derivative<S: Scalar>(&self, _t: S, x: &Heights<S>, u: &Road<S>, p: &Suspension<S>) -> Heights<S> {
-        let force = p.spring * (x.wheel - x.body) + p.damper * (x.wheel_speed - x.body_speed);
+        let speed = x.wheel_speed - x.body_speed;
+        let force = p.spring * (x.wheel - x.body) + p.damper * (speed + speed.powi(3) * 1e-6);
         let wheel = (p.tire * (u.height - x.wheel) - force) / p.wheel;
         Heights { body: x.body_speed, body_speed: force / 300.0, wheel: x.wheel_speed, wheel_speed: wheel }
     }
@@ -315,7 +316,7 @@ fn a_step_is_judged_where_the_plant_moves() {
             };
             // Four standard errors: beyond lies a part of 1e-4 of all.
             assert!(off(&fit) < 4.0 && fit.severity() < Severity::NotUsable, "{fit}");
-            assert!(fit.method.integrator.contains("4 steps per sample") && off(&coarse) > 1.5, "{fit}");
+            assert!(fit.method.integrator.contains("exact transition") && off(&coarse) > 1.5, "{fit}");
         }
     }
 }
