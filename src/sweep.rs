@@ -323,6 +323,11 @@ pub trait Sweep: Send + Sync {
         false
     }
 
+    /// Whether its equations are linear with constant coefficients, so that they can be run without an error of the step.
+    fn is_linear(&self) -> bool {
+        false
+    }
+
     /// This sweep with a finer step, if there is one, to run so many samples: whether its equations are worth compiling depends on
     /// their number.
     fn refined<'s>(&'s self, samples: usize) -> Option<Arc<dyn Sweep + 's>> {

@@ -68,6 +68,11 @@ impl Equations {
     /// These equations as linear ones; `None` where they are not, where their coefficients change, where an input is late, and where what samples
     /// change of the state is not affine in it.
     pub(crate) fn linear(&self) -> Option<Linear> {
+        self.is_linear().then(|| Linear::of(self))
+    }
+
+    /// Whether they are so.
+    pub(crate) fn is_linear(&self) -> bool {
         let (layout, roots, graph) = (&self.layout, &self.roots, &self.graph);
         let at_most_one = |roots: &[Id], of: &dyn Fn(Leaf) -> bool| {
             let degrees = degrees(graph, of);
@@ -83,7 +88,7 @@ impl Equations {
         let is_late = self.late().contains(&true);
         let continuous = layout.kind == Kind::Continuous && !layout.states.is_empty();
         let jumps_affinely = at_most_one(&roots.jump, &|leaf| matches!(leaf, Leaf::State(_)));
-        (continuous && is_linear && !moves && !is_late && jumps_affinely).then(|| Linear::of(self))
+        continuous && is_linear && !moves && !is_late && jumps_affinely
     }
 }
 

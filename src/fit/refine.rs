@@ -165,13 +165,17 @@ impl Attempt {
             (Ok(before), Ok(again)) if explains_more(&again, &before) => (before, again),
             (before, _) => return Attempt { found: before, coarser: self.coarser },
         };
-        let mut coarser = self.coarser;
+        let again = if moves_nothing(&before, &again) { without_step(again) } else { again };
+        Attempt { found: Ok(after(&before, again)), coarser: self.coarser }.beside(&before)
+    }
+
+    /// This answer beside an estimate by a coarser method, if that is a minimum.
+    pub fn beside(mut self, before: &Summary) -> Self {
         if let Some(deviance) = before.deviance.filter(|_| before.outcome.converged()) {
             let values = before.unknowns.iter().map(|unknown| unknown.value).collect();
-            coarser.push(Coarser { deviance, integrator: before.method.integrator.clone(), values });
+            self.coarser.push(Coarser { deviance, integrator: before.method.integrator.clone(), values });
         }
-        let again = if moves_nothing(&before, &again) { without_step(again) } else { again };
-        Attempt { found: Ok(after(&before, again)), coarser }
+        self
     }
 
     /// The answer, with a note where a coarser step explains the data better, or as well with other values.
@@ -336,7 +340,7 @@ fn with_starts_of(found: Summary, again: Summary) -> Summary {
 }
 
 /// An estimate with the work of a later search that found no better one.
-fn with_work_of(found: Summary, again: &Summary) -> Summary {
+pub(super) fn with_work_of(found: Summary, again: &Summary) -> Summary {
     Summary {
         iterations: found.iterations + again.iterations,
         evaluations: found.evaluations + again.evaluations,

@@ -1,8 +1,8 @@
 //! Running a problem: search, estimate at a given point, objective, prediction, states.
 
-use super::elsewhere::{leaves_unexplained, with_work_of};
+use super::elsewhere::{self, leaves_unexplained};
 use super::predict::asked;
-use super::refine::{Attempt, Start};
+use super::refine::{Attempt, Start, with_work_of};
 use super::search::{at_end, search, settled};
 use super::staged::{after_stages, noted};
 use super::stages::Led;
@@ -18,6 +18,9 @@ use crate::record::Record;
 use crate::sweep::States;
 use std::time::Instant;
 
+/// Most trial steps of a search by a default step that is wrong, beside an estimate without one.
+const COARSER_TRIALS: u64 = 50;
+
 static NEVER: Control = Control::NEVER;
 
 impl Problem<'_> {
@@ -32,26 +35,62 @@ impl Problem<'_> {
     }
 
     /// [`run`](Self::run) with a time limit that counts from `begin`. A default method whose step moves the answer, or with which the start
-    /// cannot be simulated, is followed by finer ones.
+    /// cannot be simulated, is followed by finer ones. One that is wrong at the start, where others are exact, is left out.
     pub(super) fn run_since(&self, begin: Instant) -> Result<Summary, Error> {
         let control = self.control(begin);
-        let (found, led) = self.run_first(begin, &control);
+        match self.crossed(&control) {
+            Some(exact) => {
+                let found = exact.run_by_methods(begin, &control)?;
+                self.with_coarser(found, begin, &control)
+            }
+            None => self.run_by_methods(begin, &control),
+        }
+    }
+
+    /// This problem with the exact transition of linear equations, where the default step decides the cost at the start.
+    fn crossed(&self, control: &Control) -> Option<Problem<'_>> {
+        let start = self.unknowns.start();
+        let wrong = || self.in_units(control).step_decides(&start).unwrap_or(true);
+        if self.finer.is_none() || !self.sweep.is_linear() || !wrong() {
+            return None;
+        }
+        let exact = self.finer(0).filter(|finer| finer.steps == 1 && !finer.sweep.is_adaptive())?;
+        exact.in_units(control).cost_at(&start).ok()?;
+        Some(Problem { settings: self.settings.clone(), ..exact.clone() })
+    }
+
+    /// An estimate by an exact transition, with a note where a search by the default step from there explains the data better, or as well.
+    fn with_coarser(&self, found: Summary, begin: Instant, control: &Control) -> Result<Summary, Error> {
+        let trials = self.settings.optimizer.most().saturating_sub(found.iterations).min(COARSER_TRIALS);
+        if trials == 0 || !found.outcome.converged() || control.stops() {
+            return Ok(found);
+        }
+        let settings = Settings { searches: SearchPlan::Single, checkpoint: None, ..self.settings.clone() };
+        let start = Start { coordinates: found.coordinates(), trials, ends: None, stages: None };
+        match (Problem { settings, ..self.clone() }).run_within(begin, control, start) {
+            Ok(coarser) => Attempt::new(Ok(with_work_of(found, &coarser))).beside(&coarser).answer(),
+            Err(_) => Ok(found),
+        }
+    }
+
+    fn run_by_methods(&self, begin: Instant, control: &Control) -> Result<Summary, Error> {
+        let (found, led) = self.run_first(begin, control);
         // Before finer methods, each of which takes several times as long.
         let explained = led.as_ref().is_some_and(Led::explains);
         let further = found.as_ref().ok().filter(|_| !explained);
-        let further = further.and_then(|found| self.search_further(found, &control));
-        let found = found.map(|found| with_work_of(found, further.as_ref()));
+        let further = further.and_then(|found| self.search_further(found, control));
+        let found = found.map(|found| elsewhere::with_work_of(found, further.as_ref()));
         let found = match further.as_ref().zip(found.as_ref().ok()).and_then(|(further, found)| further.usable(found)) {
             Some(usable) => usable,
-            None => self.or_in_stages(self.refined(found, 0, begin, &control), &control)?,
+            None => self.or_in_stages(self.refined(found, 0, begin, control), control)?,
         };
         // Pieces that are explained have an estimate of their own.
         let found = match explained && leaves_unexplained(&found) {
             true => found,
-            false => self.searched_elsewhere(&found, further.as_ref(), &control).unwrap_or(found),
+            false => self.searched_elsewhere(&found, further.as_ref(), control).unwrap_or(found),
         };
         let led = led.as_ref().or(further.as_ref().and_then(|further| further.led()));
-        Ok(self.or_by_pieces(found, led, &control))
+        Ok(self.or_by_pieces(found, led, control))
     }
 
     /// The estimate from the declared start, or from the end of stages if they were asked for.

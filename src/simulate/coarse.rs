@@ -44,8 +44,8 @@ impl<S: Signals> Coarse<S> {
 
     /// An error where a state is another by a tenth.
     pub fn check(&self, time: &Time) -> Result<(), Error> {
-        let hint = "; with two steps in place of one it differs by more than a tenth of its largest value: choose a method with \
-                    Simulator::integrator, such as Rk45 or, for a model with a fast mode, Esdirk";
+        let hint = "; with two steps in place of one it differs by more than a tenth of its largest value: choose another integrator, Rk45 \
+                    or, for a model with a fast mode, Esdirk";
         let coarse = |state: &State| state.difference.is_nan() || state.difference > APART * state.largest;
         match self.states.iter().position(coarse) {
             Some(i) => {
@@ -94,7 +94,7 @@ mod tests {
         let Err(Error::Simulation(failure)) = run(4.0, 1.0) else { panic!("accepted") };
         assert_eq!((failure.sample, &failure.signal[..]), (1, "state `i`"));
         assert!(
-            (failure.value - 1.0 / 3.0).abs() < 1e-15 && failure.hint.contains("Simulator::integrator"),
+            (failure.value - 1.0 / 3.0).abs() < 1e-15 && failure.hint.contains("choose another integrator, Rk45"),
             "{failure}"
         );
         let chosen = Simulator::new(&Decay).integrator(Rk4 { substeps: 1 });

@@ -324,6 +324,10 @@ impl Sweep for ProgramSweep<'_> {
         self.plain.locate(record, state, parameters, sample, sigma, stops)
     }
 
+    fn is_linear(&self) -> bool {
+        self.programs.equations.is_linear()
+    }
+
     fn refined<'s>(&'s self, samples: usize) -> Option<Arc<dyn Sweep + 's>> {
         let plain = self.plain.refined(samples)?;
         let programs = if samples >= WORTH_COMPILING { self.programs.refined() } else { None };

@@ -223,6 +223,25 @@ fn a_record_simulated_with_a_coarse_step_is_named() {
     assert!(warning.severity == Severity::UsableWithCare && warning.text.contains("simulated with it"), "{fit}");
 }
 
+/// Of linear equations, too, whose fit begins without steps where one is wrong at the start: `1 - z + z^2/2 - z^3/6 + z^4/24` at `z = 2` is a third, as
+/// `exp(-1.1)` is, so that the time constant would be 1.82 s by one step where it is 1 s.
+#[test]
+fn a_record_of_a_linear_plant_simulated_with_a_coarse_step_is_named() {
+    let inputs: Vec<Voltage> = levels(200, 3, 5).into_iter().map(|u| Voltage { u }).collect();
+    let (truth, time) = (Branch { gain: 2.0, tau: 1.0 }, Time::Uniform { start: 0.0, step: 2.0 });
+    let simulator = Simulator::new(&Lag).integrator(Rk4 { substeps: 1 });
+    let run = simulator.run(&truth, &Current { i: 0.0 }, time, &inputs).unwrap();
+    let record = run.with_noise(Current { i: 0.01 }, 3).experiment(&Lag).unwrap();
+    let fit = Fit::new(&Lag, &record).parameters(Branch { gain: free(1.5), tau: free(1.2) }).run().unwrap();
+    assert!(fit.outcome.converged() && fit.method.integrator.contains("exact transition"), "{fit}");
+    assert!((fit.parameters.tau - 2.0 / 3f64.ln()).abs() < 4.0 * fit.knowledge.tau.standard_error().unwrap(), "{fit}");
+    let note = fit.warnings.iter().find(|warning| warning.code == WarningCode::CoarseStep).unwrap();
+    assert!(
+        note.text.contains("Runge-Kutta 4, 1 step per sample") && note.text.contains("explains them as well"),
+        "{fit}"
+    );
+}
+
 /// With more noise the data do not tell the step that simulated them from a finer one, which moves the tire's stiffness by several
 /// standard errors: each of ten estimates says so, or that the coarse step explains more.
 #[test]

@@ -84,6 +84,22 @@ fn a_motor_with_a_fast_current_is_fitted() {
     }
 }
 
+/// The default step is wrong at the start, so that all searches cross the intervals exactly. By that step each of four starts would end elsewhere.
+#[test]
+fn searches_of_a_fast_linear_plant_begin_without_steps() {
+    for rate in [30.0, 1e4] {
+        let (p, record) = motor(&Direct { fan: 0.0 }, rate);
+        let fit = || Fit::new(&Direct { fan: 0.0 }, &record).parameters(off(p));
+        let (alone, many) = (fit().run().unwrap(), fit().starts(4).run().unwrap());
+        is_right(&many, &[p.r, p.k, p.j, p.d], "exact transition of linear equations");
+        assert_eq!((alone.method.refinement, many.method.refinement), (1, 1));
+        assert_eq!(many.starts.as_ref().map(|starts| (starts.agreed, starts.failed.len())), Some((4, 0)), "{many}");
+        for (a, b) in many.unknowns.iter().zip(&alone.unknowns) {
+            assert!((a.value - b.value).abs() < 1e-5 * b.knowledge.standard_error().unwrap(), "{many}");
+        }
+    }
+}
+
 signals! { pub struct Species { a: "", b: "", c: "" } }
 signals! { pub struct Measured { a: "", c: "" } }
 signals! { pub struct Rates { k1: "1/s", k2: "1/s", k3: "1/s" } }

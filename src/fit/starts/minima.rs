@@ -188,13 +188,16 @@ pub(super) fn found(
     let ended = order.iter().filter(|i| minimum(i)).filter_map(|&i| Some((i, found[i].as_ref()?)));
     let mut kinds = kinds(&comparison, ended);
     let (names, values) = (plain.names(), |x: &[f64]| plain.problem.unknowns.values(x));
-    // Of minima with the same cost, such as mirror images, one whose values have the signs that were declared comes first.
+    // Of minima with the same cost, such as mirror images, one whose values have the signs that were declared comes first, and of these that to which the
+    // declared start leads.
     let has_signs = |kind: &Kind<'_>| {
         let end = found[kind.searches[0]].as_ref();
         end.is_some_and(|end| plain.problem.unknowns.have_declared_signs(values(&end.search.coordinates)))
     };
-    let as_good = |kind: &Kind<'_>| kinds[0].first.costs_as_much_as(kind.first, &comparison);
-    if let Some(place) = kinds.iter().position(|kind| as_good(kind) && has_signs(kind))
+    let as_good = |kind: &Kind<'_>| kind.first.cost_ratio(kinds[0].first, &comparison) <= 1.0 + SAME_COST;
+    let rank = |kind: &Kind<'_>| (!has_signs(kind), !kind.searches.contains(&0));
+    let places = kinds.iter().enumerate().filter(|(_, kind)| as_good(kind));
+    if let Some((place, _)) = places.min_by_key(|(_, kind)| rank(kind))
         && kinds[0].searches.contains(&best)
     {
         kinds[..=place].rotate_right(1);

@@ -82,7 +82,8 @@ fn ends_that_are_one_minimum() {
     assert_eq!(agreed([(2.004, rough(1e-2)), (2.0, MINIMUM)]), (1, 2, Some(1)));
 }
 
-/// Of a minimum and its mirror image, which cost the same, that of the declared sign is the best; a lower cost of the other one decides.
+/// Of a minimum and its mirror image, which cost the same, that of the declared sign is the best, and without one that to which the declared start leads; a
+/// lower cost of the other one decides.
 #[test]
 fn a_mirror_image_of_the_wrong_sign() {
     #[derive(Clone)]
@@ -104,6 +105,11 @@ fn a_mirror_image_of_the_wrong_sign() {
     assert_eq!(gains, [2.0, -2.0, 2.1]);
     assert_eq!((starts.minima[0].cost_ratio, starts.minima[1].cost_ratio), (1.0, 1.0));
     assert_eq!(ended_by(&Square, free(1.0), &ends).0, 0);
+    // A part of 3e-13 of the cost.
+    let lower = [-2.0 - 1e-8, 2.0, 2.0].map(|a| Some((a, MINIMUM)));
+    let (best, starts) = ended_by(&Square, free(1.0), &lower);
+    assert_eq!((best, starts.agreed, starts.declared, starts.minima.len()), (0, 1, Some(0), 2));
+    assert_eq!(ended_by(&Square, free(1.0).positive(), &lower).0, 1);
     assert_eq!(ended_by(&Square, free(1.0).positive(), &ends[2..]).0, 0);
 }
 
