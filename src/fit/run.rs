@@ -2,7 +2,7 @@
 
 use super::elsewhere::{self, leaves_unexplained};
 use super::predict::asked;
-use super::refine::{Attempt, Start, with_work_of};
+use super::refine::{Attempt, Start, after, with_work_of};
 use super::search::{at_end, search, settled};
 use super::staged::{after_stages, noted};
 use super::stages::Led;
@@ -59,7 +59,8 @@ impl Problem<'_> {
         Some(Problem { settings: self.settings.clone(), ..exact.clone() })
     }
 
-    /// An estimate by an exact transition, with a note where a search by the default step from there explains the data better, or as well.
+    /// An estimate by an exact transition, with a note where a search by the default step from there explains the data better, or as well; its estimate where it
+    /// reproduces them, which were simulated with that step.
     fn with_coarser(&self, found: Summary, begin: Instant, control: &Control) -> Result<Summary, Error> {
         let trials = self.settings.optimizer.most().saturating_sub(found.iterations).min(COARSER_TRIALS);
         if trials == 0 || !found.outcome.converged() || control.stops() {
@@ -68,6 +69,9 @@ impl Problem<'_> {
         let settings = Settings { searches: SearchPlan::Single, checkpoint: None, ..self.settings.clone() };
         let start = Start { coordinates: found.coordinates(), trials, ends: None, stages: None };
         match (Problem { settings, ..self.clone() }).run_within(begin, control, start) {
+            Ok(coarser) if coarser.outcome == Outcome::Exact && found.outcome != Outcome::Exact => {
+                Ok(after(&found, coarser))
+            }
             Ok(coarser) => Attempt::new(Ok(with_work_of(found, &coarser))).beside(&coarser).answer(),
             Err(_) => Ok(found),
         }
