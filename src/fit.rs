@@ -155,7 +155,8 @@ impl<'a, M: Made> Fit<'a, M> {
     /// unknown by more than a tenth of its standard error, where the start cannot be simulated, or where a search that did not
     /// converge had a cost that a finer step changes, it takes 4, 16, 64 and 256 steps per sample, then [`Esdirk`](crate::Esdirk); of linear equations
     /// with constant coefficients, of up to 32 states and without dead time, their exact transition in place of these steps, from the first
-    /// search on if a finer step changes the cost at the start by a tenth. The estimate names the method ([`Method::integrator`](crate::estimate::Method)), and is not usable if none is fine enough. A finer step
+    /// search on if a finer step changes the cost at the start by a tenth. The estimate names the method
+    /// ([`Method::integrator`](crate::estimate::Method)), and is not usable if none is fine enough. A finer step
     /// stays where a coarser one explains the data better, or as well with other values, which is said. `Esdirk` is stopped where it
     /// needs 3,000 steps for a sample, or 1,000 for each: such a model is not stiff, but fast, or its state grows without bound. It is not
     /// tried where two steps leave an output unexplained at the same deviance. A

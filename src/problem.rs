@@ -77,7 +77,7 @@ pub struct Problem<'a> {
     pub(crate) cuts: Cuts,
     /// Number of the method among those of a default fit: that which it begins with, or that was chosen, is 0.
     pub(crate) method: usize,
-    /// Steps per sample of a method that follows the default one; else one.
+    /// Steps per sample of the method, if it follows the default one and does not choose them; else one.
     pub(crate) steps: usize,
     /// Whether the method was chosen by the library, which then answers for its step.
     pub(crate) refines: bool,

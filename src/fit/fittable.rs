@@ -74,9 +74,9 @@ pub trait Made: Fittable {
     fn stepping(integrator: impl Integrator) -> Self::Stepping;
     /// The transition of equations that are linear with constant coefficients.
     fn exact(&self) -> Option<Self::Stepping>;
-    /// The methods that follow the default one, of what is continuous: [`exact`](Self::exact) where that `serves`, else ever shorter steps; and last one for
-    /// stiff models. Each after its steps per sample.
-    fn finer(&self, serves: bool) -> Vec<(usize, Self::Stepping)>;
+    /// The methods that follow the default one of a continuous model, each with its steps per sample: [`exact`](Self::exact) where the model has it and
+    /// `crosses` allows it, else shorter and shorter steps; at last a method for stiff models.
+    fn finer(&self, crosses: bool) -> Vec<(usize, Self::Stepping)>;
     /// A sweep, by the default integrator and of the simulation error unless said otherwise.
     fn sweep<'a>(
         model: Handle<'a, Self>,
@@ -124,10 +124,10 @@ where
     }))
 }
 
-/// Most states of equations whose transition is taken by itself: its matrices are full, and are made anew for each set of parameters.
+/// Most states of equations whose exact transition is taken without being asked for: its matrices are full, and are computed anew for each set of parameters.
 const WIDEST: usize = 32;
 
-/// The methods that follow a default one, each after its steps per sample.
+/// The methods that follow a default one, each with its steps per sample.
 fn following<T>(exact: Option<T>, automatic: impl Fn(u32) -> T, stiff: T) -> Vec<(usize, T)> {
     let by_steps = || SUBSTEPS.map(|steps| (steps as usize, automatic(steps))).into_iter().collect();
     let mut methods: Vec<(usize, T)> = exact.map_or_else(by_steps, |exact| vec![(1, exact)]);
@@ -224,9 +224,9 @@ impl<M: Model> Made for M {
         Some(Stepping { method: exact(), ..Stepping::automatic(1) })
     }
 
-    fn finer(&self, serves: bool) -> Vec<(usize, Stepping<M>)> {
+    fn finer(&self, crosses: bool) -> Vec<(usize, Stepping<M>)> {
         let stiff = Stepping { loops: Arc::new(Narrow(Stiff::default())), method: stiff() };
-        following(serves.then(|| self.exact()).flatten(), Stepping::automatic, stiff)
+        following(crosses.then(|| self.exact()).flatten(), Stepping::automatic, stiff)
     }
 
     /// A compiled program if the model can be traced, else dual numbers.
@@ -291,8 +291,8 @@ impl Made for Equations {
         self.linear().map(|_| AnyStepping(exact()))
     }
 
-    fn finer(&self, serves: bool) -> Vec<(usize, AnyStepping)> {
-        let exact = serves.then(|| self.exact()).flatten();
+    fn finer(&self, crosses: bool) -> Vec<(usize, AnyStepping)> {
+        let exact = crosses.then(|| self.exact()).flatten();
         following(exact, |steps| AnyStepping(automatic(steps)), AnyStepping(stiff()))
     }
 
@@ -350,7 +350,7 @@ impl Made for Arc<dyn Sweep + '_> {
         None
     }
 
-    fn finer(&self, _serves: bool) -> Vec<(usize, AnyStepping)> {
+    fn finer(&self, _crosses: bool) -> Vec<(usize, AnyStepping)> {
         vec![]
     }
 

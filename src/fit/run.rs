@@ -18,7 +18,8 @@ use crate::record::Record;
 use crate::sweep::States;
 use std::time::Instant;
 
-/// Most trial steps of a search by a default step that is wrong, beside an estimate without one.
+/// Most trial steps of the search by the default step after a fit by the exact transition: a search that the data of that step lead to its minimum takes some
+/// ten to twenty.
 const COARSER_TRIALS: u64 = 50;
 
 static NEVER: Control = Control::NEVER;
@@ -35,7 +36,8 @@ impl Problem<'_> {
     }
 
     /// [`run`](Self::run) with a time limit that counts from `begin`. A default method whose step moves the answer, or with which the start
-    /// cannot be simulated, is followed by finer ones. One that is wrong at the start, where others are exact, is left out.
+    /// cannot be simulated, is followed by finer ones. For linear equations whose cost at the start the default step decides, the fit begins with their exact
+    /// transition.
     pub(super) fn run_since(&self, begin: Instant) -> Result<Summary, Error> {
         let control = self.control(begin);
         match self.crossed(&control) {
@@ -59,24 +61,25 @@ impl Problem<'_> {
         Some(Problem { settings: self.settings.clone(), ..exact.clone() })
     }
 
-    /// An estimate by an exact transition, with a note where a search by the default step from there explains the data better, or as well; its estimate where it
-    /// reproduces them, which were simulated with that step.
+    /// An estimate by the exact transition, with a note where a search by the default step explains the data better, or as well. Where that search reproduces
+    /// the data to their rounding they were simulated with this step, and its estimate is taken. It begins at the exact estimate, or at the declared
+    /// start if that is no minimum.
     fn with_coarser(&self, found: Summary, begin: Instant, control: &Control) -> Result<Summary, Error> {
         let trials = self.settings.optimizer.most().saturating_sub(found.iterations).min(COARSER_TRIALS);
-        if trials == 0 || !found.outcome.converged() || control.stops() {
+        if trials == 0 || found.outcome == Outcome::Exact || control.stops() {
             return Ok(found);
         }
+        let coordinates = if found.outcome.converged() { found.coordinates() } else { self.unknowns.start() };
         let settings = Settings { searches: SearchPlan::Single, checkpoint: None, ..self.settings.clone() };
-        let start = Start { coordinates: found.coordinates(), trials, ends: None, stages: None };
+        let start = Start { coordinates, trials, ends: None, stages: None };
         match (Problem { settings, ..self.clone() }).run_within(begin, control, start) {
-            Ok(coarser) if coarser.outcome == Outcome::Exact && found.outcome != Outcome::Exact => {
-                Ok(after(&found, coarser))
-            }
+            Ok(coarser) if coarser.outcome == Outcome::Exact => Ok(after(&found, coarser)),
             Ok(coarser) => Attempt::new(Ok(with_work_of(found, &coarser))).beside(&coarser).answer(),
             Err(_) => Ok(found),
         }
     }
 
+    /// The estimate by this method, or by a finer one, and by further searches where it leaves an output unexplained.
     fn run_by_methods(&self, begin: Instant, control: &Control) -> Result<Summary, Error> {
         let (found, led) = self.run_first(begin, control);
         // Before finer methods, each of which takes several times as long.

@@ -5,11 +5,11 @@ use crate::error::Error;
 use crate::sweep::Sweep;
 use std::sync::{Arc, OnceLock};
 
-/// A sweep by a method, after the steps per sample that this takes; one, where it chooses them.
-pub(crate) type Made<'a> = (usize, Arc<dyn Sweep + 'a>);
+/// A sweep by a method, and its steps per sample: one, where the method chooses them or takes none.
+pub(crate) type Stepped<'a> = (usize, Arc<dyn Sweep + 'a>);
 
 /// Makes the sweep by a method, numbered from the first one that follows the default one; `None` after the last.
-pub(crate) type MakeSweep<'a> = Arc<dyn Fn(usize) -> Option<Made<'a>> + Send + Sync + 'a>;
+pub(crate) type MakeSweep<'a> = Arc<dyn Fn(usize) -> Option<Stepped<'a>> + Send + Sync + 'a>;
 
 /// A problem by finer methods.
 pub(crate) trait Finer: Send + Sync {
@@ -20,7 +20,7 @@ pub(crate) trait Finer: Send + Sync {
 /// Sweeps by finer and finer methods. Each is made when it is first needed, once for all problems that share these.
 pub(crate) struct FinerSweeps<'a> {
     make: Option<MakeSweep<'a>>,
-    made: [OnceLock<Option<Made<'a>>>; MOST],
+    made: [OnceLock<Option<Stepped<'a>>>; MOST],
 }
 
 impl<'a> FinerSweeps<'a> {
@@ -33,7 +33,7 @@ impl<'a> FinerSweeps<'a> {
         Arc::new(FinerSweeps { make: None, made: Default::default() })
     }
 
-    fn get(&self, number: usize) -> Option<Made<'a>> {
+    fn get(&self, number: usize) -> Option<Stepped<'a>> {
         let (make, made) = (self.make.as_ref()?, self.made.get(number)?);
         made.get_or_init(|| make(number)).clone()
     }
@@ -50,8 +50,9 @@ impl<'a> FinerSweeps<'a> {
 const TRIALS: u64 = 20;
 pub(crate) const PARTS: u64 = 5;
 
-/// Steps per sample of the methods that follow the default one, where intervals are not crossed exactly; after them comes one for stiff models.
+/// Steps per sample of the methods that follow the default one where there is no exact transition; after them comes a method for stiff models.
 pub(crate) const SUBSTEPS: [u32; 4] = [4, 16, 64, 256];
+/// Methods that follow a default one at most.
 const MOST: usize = SUBSTEPS.len() + 1;
 
 /// The problem by each method is made when it is first needed.
@@ -88,7 +89,7 @@ impl<'a> Problem<'a> {
         self.method > 0 && (most == TRIALS || most == TRIALS * PARTS)
     }
 
-    fn with_sweep(&self, (steps, sweep): Made<'a>, method: usize) -> Result<Self, Error> {
+    fn with_sweep(&self, (steps, sweep): Stepped<'a>, method: usize) -> Result<Self, Error> {
         let prepared = Problem::prepared(&*sweep, &self.records, &self.unknowns.parameters)?;
         let cuts = Cuts::new(&*sweep, &self.records, self.settings.prefilter.is_some());
         Ok(Problem { sweep, prepared, cuts, method, steps, ..self.clone() })

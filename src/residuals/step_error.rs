@@ -157,8 +157,8 @@ fn batches<'w>(
     alike.flat_map(|alike| alike.chunks(finer.lanes(all[alike[0].0].record(), &[]).max(1))).collect()
 }
 
-/// The sum of squared standardized changes in each window of a batch, and its samples. Where it cannot be simulated the change is infinite; zero with a method
-/// that chooses its steps, which may have come to the most of them.
+/// The sum of squared standardized changes in each window of a batch, and its samples. The change is infinite where the simulation
+/// fails; with a method that chooses its steps it is zero, since such a method also fails where it needs more steps than it may take.
 fn changes(finer: &dyn Sweep, all: &[Compared<'_>], windows: &[(usize, &Sampled)]) -> Vec<(f64, usize)> {
     let at = |i: &usize| {
         let Compared { objective, coordinates, experiment, .. } = all[*i];

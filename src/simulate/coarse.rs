@@ -1,4 +1,4 @@
-//! [`Coarse`]: whether steps that nobody chose are far too long.
+//! [`Coarse`]: whether the default step is far too long for a simulation.
 
 use super::failed;
 use crate::error::Error;
@@ -6,10 +6,11 @@ use crate::record::Time;
 use crate::signals::{Of, Signals};
 use core::marker::PhantomData;
 
-/// Largest part of a state's largest value by which two steps may differ from one.
+/// Largest part of a state's largest value by which two steps may differ from one: an error of a tenth is seen in any plot. One step is off by that at 1.74
+/// time constants, and unstable from 2.79 on.
 const APART: f64 = 0.1;
 
-/// What two steps in place of one change of each state, over a simulation.
+/// The largest difference of each state, over all samples of a simulation, between one step and two from the same state.
 pub(super) struct Coarse<S> {
     states: Vec<State>,
     of: PhantomData<S>,
@@ -29,7 +30,7 @@ impl<S: Signals> Coarse<S> {
         Coarse { states: vec![State::default(); S::LEN], of: PhantomData }
     }
 
-    /// Takes the state at a sample by one step, and by two.
+    /// Adds the state at a sample by one step and by two.
     pub fn compare(&mut self, sample: usize, one: &Of<S, f64>, two: &Of<S, f64>) {
         let (one, two) = (S::into_array(*one), S::into_array(*two));
         for (state, (one, two)) in self.states.iter_mut().zip(one.as_ref().iter().zip(two.as_ref())) {
@@ -42,7 +43,7 @@ impl<S: Signals> Coarse<S> {
         }
     }
 
-    /// An error where a state is another by a tenth.
+    /// An error if a state differs by more than a tenth of its largest value.
     pub fn check(&self, time: &Time) -> Result<(), Error> {
         let hint = "; with two steps in place of one it differs by more than a tenth of its largest value: choose another integrator, Rk45 \
                     or, for a model with a fast mode, Esdirk";

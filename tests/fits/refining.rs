@@ -242,6 +242,45 @@ fn a_record_of_a_linear_plant_simulated_with_a_coarse_step_is_named() {
     );
 }
 
+signals! { struct Pair { first: "A", second: "A" } }
+
+/// Two lags of one time constant.
+#[derive(Clone)]
+struct Chain;
+
+impl Model for Chain {
+    type State = Pair;
+    type Input = Voltage;
+    type Output = Current;
+    type Parameters = Branch;
+    fn derivative<S: Scalar>(&self, _t: S, x: &Pair<S>, u: &Voltage<S>, p: &Branch<S>) -> Pair<S> {
+        Pair { first: (p.gain * u.u - x.first) / p.tau, second: (x.first - x.second) / p.tau }
+    }
+    fn output<S: Scalar>(&self, _t: S, x: &Pair<S>, _u: &Voltage<S>, _p: &Branch<S>) -> Current<S> {
+        Current { i: x.second }
+    }
+}
+
+/// Without noise the step that simulated a record is the one that reproduces it: from starts at which it decides the cost, and where exact equations, which
+/// explain the record of two time constants per step by no values, have no minimum.
+#[test]
+fn a_record_of_a_linear_plant_is_reproduced_by_the_step_that_simulated_it() {
+    let inputs: Vec<Voltage> = levels(200, 3, 5).into_iter().map(|u| Voltage { u }).collect();
+    let rest = Pair { first: 0.0, second: 0.0 };
+    for (step, off) in [(1.0, 1.01), (1.0, 1.5), (2.0, 1.2)] {
+        let (truth, time) = (Branch { gain: 2.0, tau: 1.0 }, Time::Uniform { start: 0.0, step });
+        let run = Simulator::new(&Chain).integrator(Rk4 { substeps: 1 }).run(&truth, &rest, time, &inputs).unwrap();
+        let record = run.experiment(&Chain).unwrap().initial(Pair::map(rest, fixed));
+        let start = Branch { gain: free(2.0 * off), tau: free(off) };
+        let fit = Fit::new(&Chain, &record).parameters(start).run().unwrap();
+        assert!(fit.outcome == Outcome::Exact && fit.method.integrator.contains("1 step per sample"), "{fit}");
+        // Rounding.
+        assert!((fit.parameters.tau - 1.0).abs() < 1e-9 && (fit.parameters.gain - 2.0).abs() < 1e-9, "{fit}");
+        let note = fit.warnings.iter().find(|warning| warning.code == WarningCode::CoarseStep).unwrap();
+        assert!(note.severity == Severity::UsableWithCare && note.text.contains("simulated with this step"), "{fit}");
+    }
+}
+
 /// With more noise the data do not tell the step that simulated them from a finer one, which moves the tire's stiffness by several
 /// standard errors: each of ten estimates says so, or that the coarse step explains more.
 #[test]
