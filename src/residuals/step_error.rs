@@ -196,28 +196,8 @@ fn changes(finer: &dyn Sweep, all: &[Compared<'_>], windows: &[(usize, &Sampled)
 #[cfg(test)]
 mod tests {
     use crate::residuals::residual_pass;
+    use crate::tests::{Current, Decay, Rate, Voltage};
     use crate::{Experiment, Fit, Kalman, Model, Rk4, Scalar, Time, fixed, free, signals, simulate};
-
-    signals! { struct Voltage { u: "V" } }
-    signals! { struct Current { i: "A" } }
-    signals! { struct Rate { a: "1/s" } }
-
-    #[derive(Clone)]
-    struct Decay;
-
-    impl Model for Decay {
-        type State = Current;
-        type Input = Voltage;
-        type Output = Current;
-        type Parameters = Rate;
-
-        fn derivative<S: Scalar>(&self, _t: S, x: &Current<S>, u: &Voltage<S>, p: &Rate<S>) -> Current<S> {
-            Current { i: (u.u - x.i) * p.a }
-        }
-        fn output<S: Scalar>(&self, _t: S, x: &Current<S>, _u: &Voltage<S>, _p: &Rate<S>) -> Current<S> {
-            *x
-        }
-    }
 
     /// Records of one window each: the root of the sum of all squared differences between one step per sample and two, by the noise.
     #[test]
