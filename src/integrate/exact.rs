@@ -17,11 +17,11 @@ pub(super) const STEPS: u32 = 4;
 pub(super) struct Exact;
 
 impl Method for Exact {
-    fn advance_values(&self, field: &Field<'_, f64>, x: Vec<f64>, step: &mut f64) -> Result<Vec<f64>, Stuck> {
+    fn advance_values(&self, field: &Field<'_, f64>, x: &mut [f64], step: &mut f64) -> Result<(), Stuck> {
         automatic(STEPS).advance_values(field, x, step)
     }
 
-    fn advance_duals(&self, field: &Field<'_, Duals>, x: Vec<Duals>, step: &mut f64) -> Result<Vec<Duals>, Stuck> {
+    fn advance_duals(&self, field: &Field<'_, Duals>, x: &mut [Duals], step: &mut f64) -> Result<(), Stuck> {
         automatic(STEPS).advance_duals(field, x, step)
     }
 

@@ -9,6 +9,7 @@ use crate::layout::Kind;
 use crate::scalar::Scalar;
 use crate::signals::Entry;
 use core::fmt::Debug;
+use smallvec::{SmallVec, smallvec};
 use std::sync::Arc;
 
 /// Eight slopes at a time.
@@ -17,8 +18,11 @@ pub(crate) type Duals = Dual<8>;
 /// `f(position, x, to)`: writes a derivative, or the next state.
 pub(crate) type Rate<'a, S> = &'a dyn Fn(f64, &[S], &mut [S]);
 
-/// Value and Jacobian (by rows) of a derivative, at a position and values of the states.
-pub(crate) type Slopes<'a> = &'a dyn Fn(f64, &[f64]) -> (Vec<f64>, Vec<Vec<f64>>);
+/// `f(position, x, value, rows)`: writes a derivative and its Jacobian, row by row, at values of the states.
+pub(crate) type Slopes<'a> = &'a dyn Fn(f64, &[f64], &mut [f64], &mut [f64]);
+
+/// A vector of which a few entries need no allocation.
+pub(crate) type Short<T> = SmallVec<[T; 8]>;
 
 /// An interval of a system that is given by functions.
 pub(crate) struct Field<'a, S> {
@@ -30,19 +34,26 @@ pub(crate) struct Field<'a, S> {
     pub slopes: Slopes<'a>,
 }
 
-impl Square for Vec<Vec<f64>> {
+/// A square matrix by rows.
+#[derive(Clone)]
+pub(crate) struct Rows {
+    size: usize,
+    entries: SmallVec<[f64; 16]>,
+}
+
+impl Square for Rows {
     fn row(&self, i: usize) -> &[f64] {
-        &self[i]
+        &self.entries[i * self.size..][..self.size]
     }
     fn row_mut(&mut self, i: usize) -> &mut [f64] {
-        &mut self[i]
+        &mut self.entries[i * self.size..][..self.size]
     }
 }
 
 impl<S: Scalar> System for Field<'_, S> {
     type Scalar = S;
-    type Vector<T: Entry> = Vec<T>;
-    type Matrix = Vec<Vec<f64>>;
+    type Vector<T: Entry> = Short<T>;
+    type Matrix = Rows;
 
     fn kind(&self) -> Kind {
         self.kind
@@ -52,28 +63,99 @@ impl<S: Scalar> System for Field<'_, S> {
         self.interval
     }
 
-    fn vector<T: Entry>(&self, f: impl FnMut(usize) -> T) -> Vec<T> {
+    fn vector<T: Entry>(&self, f: impl FnMut(usize) -> T) -> Short<T> {
         (0..self.states).map(f).collect()
     }
 
-    fn derivative(&self, position: f64, x: &Vec<S>) -> Vec<S> {
-        let mut to = vec![S::from(0.0); self.states];
+    fn derivative(&self, position: f64, x: &Short<S>) -> Short<S> {
+        let mut to = smallvec![S::from(0.0); self.states];
         (self.rate)(position, x, &mut to);
         to
     }
 
-    fn next(&self, x: &Vec<S>) -> Vec<S> {
+    fn next(&self, x: &Short<S>) -> Short<S> {
         self.derivative(0.0, x)
     }
 
-    fn jacobian(&self, position: f64, x: &Vec<f64>) -> (Vec<f64>, Vec<Vec<f64>>) {
-        (self.slopes)(position, x)
+    fn jacobian(&self, position: f64, x: &Short<f64>) -> (Short<f64>, Rows) {
+        let size = self.states;
+        let mut value = smallvec![0.0; size];
+        let mut rows = Rows { size, entries: smallvec![0.0; size * size] };
+        (self.slopes)(position, x, &mut value, &mut rows.entries);
+        (value, rows)
     }
 
-    fn along(&self, x: &Vec<S>, part: f64, k: &Vec<S>) -> Vec<S> {
+    fn along(&self, x: &Short<S>, part: f64, k: &Short<S>) -> Short<S> {
         let a = self.interval.1 * part;
         x.iter().zip(k).map(|(x, k)| x.plus_times(*k, a)).collect()
     }
+}
+
+/// The same system, the number of whose states the compiler knows.
+struct OfSize<'f, 'a, S, const N: usize>(&'f Field<'a, S>);
+
+impl<const N: usize> Square for [[f64; N]; N] {
+    fn row(&self, i: usize) -> &[f64] {
+        &self[i]
+    }
+    fn row_mut(&mut self, i: usize) -> &mut [f64] {
+        &mut self[i]
+    }
+}
+
+impl<S: Scalar, const N: usize> System for OfSize<'_, '_, S, N> {
+    type Scalar = S;
+    type Vector<T: Entry> = [T; N];
+    type Matrix = [[f64; N]; N];
+
+    fn kind(&self) -> Kind {
+        self.0.kind
+    }
+
+    fn interval(&self) -> (f64, f64) {
+        self.0.interval
+    }
+
+    #[inline(always)]
+    fn vector<T: Entry>(&self, f: impl FnMut(usize) -> T) -> [T; N] {
+        core::array::from_fn(f)
+    }
+
+    #[inline(always)]
+    fn derivative(&self, position: f64, x: &[S; N]) -> [S; N] {
+        let mut to = [S::from(0.0); N];
+        (self.0.rate)(position, x, &mut to);
+        to
+    }
+
+    #[inline(always)]
+    fn next(&self, x: &[S; N]) -> [S; N] {
+        self.derivative(0.0, x)
+    }
+
+    fn jacobian(&self, position: f64, x: &[f64; N]) -> ([f64; N], [[f64; N]; N]) {
+        let (mut value, mut rows) = ([0.0; N], [[0.0; N]; N]);
+        (self.0.slopes)(position, x, &mut value, rows.as_flattened_mut());
+        (value, rows)
+    }
+
+    #[inline(always)]
+    fn along(&self, x: &[S; N], part: f64, k: &[S; N]) -> [S; N] {
+        let a = self.0.interval.1 * part;
+        core::array::from_fn(|i| x[i].plus_times(k[i], a))
+    }
+}
+
+/// Replaces the first `N` states by those at the end of the interval.
+fn advance_sized<const N: usize>(
+    integrator: &impl Integrator,
+    field: &Field<'_, Duals>,
+    x: &mut [Duals],
+    step: &mut f64,
+) -> Result<(), Stuck> {
+    let (begin, _) = x.as_chunks_mut::<N>();
+    begin[0] = integrator.advance(&OfSize(field), begin[0], step)?;
+    Ok(())
 }
 
 /// An interval of a system in symbols.
@@ -88,7 +170,7 @@ pub(crate) struct SymbolicField<'a> {
 impl System for SymbolicField<'_> {
     type Scalar = Symbol;
     type Vector<T: Entry> = Vec<T>;
-    type Matrix = Vec<Vec<f64>>;
+    type Matrix = Rows;
 
     fn kind(&self) -> Kind {
         self.kind
@@ -113,9 +195,10 @@ impl System for SymbolicField<'_> {
         self.derivative(0.0, x)
     }
 
-    fn jacobian(&self, _position: f64, x: &Vec<f64>) -> (Vec<f64>, Vec<Vec<f64>>) {
+    fn jacobian(&self, _position: f64, x: &Vec<f64>) -> (Vec<f64>, Rows) {
         Symbol::fail("its integrator asks for a Jacobian in numbers");
-        (x.clone(), vec![x.clone(); x.len()])
+        let size = x.len();
+        (x.clone(), Rows { size, entries: smallvec![f64::NAN; size * size] })
     }
 
     fn along(&self, x: &Vec<Symbol>, part: f64, k: &Vec<Symbol>) -> Vec<Symbol> {
@@ -129,8 +212,9 @@ impl System for SymbolicField<'_> {
 
 /// An [`Integrator`] as an object.
 pub(crate) trait Method: Debug + Send + Sync {
-    fn advance_values(&self, field: &Field<'_, f64>, x: Vec<f64>, step: &mut f64) -> Result<Vec<f64>, Stuck>;
-    fn advance_duals(&self, field: &Field<'_, Duals>, x: Vec<Duals>, step: &mut f64) -> Result<Vec<Duals>, Stuck>;
+    /// Replaces the state at the begin of the interval by that at its end.
+    fn advance_values(&self, field: &Field<'_, f64>, x: &mut [f64], step: &mut f64) -> Result<(), Stuck>;
+    fn advance_duals(&self, field: &Field<'_, Duals>, x: &mut [Duals], step: &mut f64) -> Result<(), Stuck>;
     fn advance_symbols(&self, field: &SymbolicField<'_>, x: Vec<Symbol>) -> Result<Vec<Symbol>, Stuck>;
     fn is_fixed(&self) -> bool;
     /// Whether linear equations with constant coefficients are to be taken from sample to sample exactly, and not by this method.
@@ -145,12 +229,23 @@ pub(crate) trait Method: Debug + Send + Sync {
 }
 
 impl<I: Integrator> Method for I {
-    fn advance_values(&self, field: &Field<'_, f64>, x: Vec<f64>, step: &mut f64) -> Result<Vec<f64>, Stuck> {
-        self.advance(field, x, step)
+    fn advance_values(&self, field: &Field<'_, f64>, x: &mut [f64], step: &mut f64) -> Result<(), Stuck> {
+        x.copy_from_slice(&self.advance(field, Short::from_slice(x), step)?);
+        Ok(())
     }
 
-    fn advance_duals(&self, field: &Field<'_, Duals>, x: Vec<Duals>, step: &mut f64) -> Result<Vec<Duals>, Stuck> {
-        self.advance(field, x, step)
+    /// Numbers with slopes are long: of a few, no more are moved than there are.
+    fn advance_duals(&self, field: &Field<'_, Duals>, x: &mut [Duals], step: &mut f64) -> Result<(), Stuck> {
+        match x.len() {
+            1 => advance_sized::<1>(self, field, x, step),
+            2 => advance_sized::<2>(self, field, x, step),
+            3 => advance_sized::<3>(self, field, x, step),
+            4 => advance_sized::<4>(self, field, x, step),
+            _ => {
+                x.copy_from_slice(&self.advance(field, Short::from_slice(x), step)?);
+                Ok(())
+            }
+        }
     }
 
     fn advance_symbols(&self, field: &SymbolicField<'_>, x: Vec<Symbol>) -> Result<Vec<Symbol>, Stuck> {

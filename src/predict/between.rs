@@ -1,9 +1,14 @@
 //! [`Between`]: an interval of a record, with its inputs.
 
 use crate::interval::Hold;
-use crate::record::{Part, Record};
+use crate::record::{Channel, Part, Record};
 use crate::scalar::Scalar;
 use core::cell::Cell;
+use core::ops::Deref;
+use smallvec::SmallVec;
+
+/// A vector of which a few entries need no allocation.
+type Short<S> = SmallVec<[S; 4]>;
 
 /// From one sample of a record to the next.
 pub(crate) struct Between<S> {
@@ -11,13 +16,30 @@ pub(crate) struct Between<S> {
     pub(super) interval: (f64, f64),
     /// The length that its transition is computed for (s).
     pub(super) crossed: f64,
-    u0: Vec<S>,
+    u0: Short<S>,
     /// The input at the end; `None` where it is held.
-    pub(super) u1: Option<Vec<S>>,
+    pub(super) u1: Option<Short<S>>,
     /// Where an input is late: between its jumps.
     pub(super) parts: Vec<Part<S>>,
     /// The part that is being crossed.
     pub(super) part: Cell<Option<usize>>,
+}
+
+/// The inputs at a position.
+pub(crate) enum Input<'b, S> {
+    Held(&'b [S]),
+    Moving(Short<S>),
+}
+
+impl<S> Deref for Input<'_, S> {
+    type Target = [S];
+
+    fn deref(&self) -> &[S] {
+        match self {
+            Input::Held(u) => u,
+            Input::Moving(u) => u,
+        }
+    }
 }
 
 impl<S: Scalar> Between<S> {
@@ -29,16 +51,17 @@ impl<S: Scalar> Between<S> {
         let (interval, crossed, part) = ((t0, length), length, Cell::new(None));
         if !delays.is_empty() {
             let (u0, parts) = (record.late_inputs(k, delays), record.parts(k, delays));
-            return Between { interval, crossed, u0, u1: None, parts, part };
+            return Between { interval, crossed, u0: u0.into(), u1: None, parts, part };
         }
-        let u0 = record.input(k);
-        let at_end = |(i, u0): (usize, &f64)| match record.input_hold(i) {
-            Hold::Zero => S::from(*u0),
-            Hold::First => S::from(record.inputs()[i].values[k + 1]),
+        let inputs = record.inputs().iter().enumerate();
+        let at_end = |(i, input): (usize, &Channel)| match record.input_hold(i) {
+            Hold::Zero => S::from(input.values[k]),
+            Hold::First => S::from(input.values[k + 1]),
         };
         let moves = !record.holds.all_zero() && !last;
-        let u1 = moves.then(|| u0.iter().enumerate().map(at_end).collect());
-        Between { interval, crossed, u0: u0.into_iter().map(S::from).collect(), u1, parts: vec![], part }
+        let u1 = moves.then(|| inputs.clone().map(at_end).collect());
+        let u0 = inputs.map(|(_, input)| S::from(input.values[k])).collect();
+        Between { interval, crossed, u0, u1, parts: vec![], part }
     }
 
     /// The same interval, whose transition is computed for this length (s): lengths that differ by rounding have one transition.
@@ -69,12 +92,14 @@ impl<S: Scalar> Between<S> {
     }
 
     /// The input there.
-    pub fn input(&self, position: f64) -> Vec<S> {
+    pub fn input(&self, position: f64) -> Input<'_, S> {
         let (u0, u1) = match self.part() {
-            Some(part) => (&part.u0, Some(&part.u1)),
-            None => (&self.u0, self.u1.as_ref()),
+            Some(part) => (&*part.u0, Some(&*part.u1)),
+            None => (&*self.u0, self.u1.as_deref()),
         };
-        let Some(u1) = u1 else { return u0.clone() };
-        u0.iter().zip(u1).map(|(u0, u1)| (*u1 - *u0) * position + *u0).collect()
+        match u1 {
+            None => Input::Held(u0),
+            Some(u1) => Input::Moving(u0.iter().zip(u1).map(|(u0, u1)| (*u1 - *u0) * position + *u0).collect()),
+        }
     }
 }

@@ -3,11 +3,12 @@
 use super::{Between, Moments};
 use crate::dual::Dual;
 use crate::functions::Functions;
-use crate::integrate::{Duals, Field, Method, Rate, Slopes, Stuck};
+use crate::integrate::{Duals, Field, Method, Rate, Short, Slopes, Stuck};
 use crate::layout::{Kind, Layout};
 use crate::scalar::Scalar;
 use crate::transition::{Crossing, Transition, squares};
-use core::cell::{Cell, RefCell};
+use core::cell::{Cell, OnceCell, RefCell};
+use smallvec::SmallVec;
 use std::rc::Rc;
 
 /// The model at one sample and in the interval to the next, with given parameters and inputs.
@@ -124,22 +125,17 @@ const LENGTHS: usize = 16;
 
 /// Numbers that a [`Method`] can integrate.
 pub(crate) trait Stepped: Scalar {
-    fn advance(method: &dyn Method, field: &Field<'_, Self>, x: Vec<Self>, step: &mut f64) -> Result<Vec<Self>, Stuck>;
+    fn advance(method: &dyn Method, field: &Field<'_, Self>, x: &mut [Self], step: &mut f64) -> Result<(), Stuck>;
 }
 
 impl Stepped for f64 {
-    fn advance(method: &dyn Method, field: &Field<'_, f64>, x: Vec<f64>, step: &mut f64) -> Result<Vec<f64>, Stuck> {
+    fn advance(method: &dyn Method, field: &Field<'_, f64>, x: &mut [f64], step: &mut f64) -> Result<(), Stuck> {
         method.advance_values(field, x, step)
     }
 }
 
 impl Stepped for Duals {
-    fn advance(
-        method: &dyn Method,
-        field: &Field<'_, Duals>,
-        x: Vec<Duals>,
-        step: &mut f64,
-    ) -> Result<Vec<Duals>, Stuck> {
+    fn advance(method: &dyn Method, field: &Field<'_, Duals>, x: &mut [Duals], step: &mut f64) -> Result<(), Stuck> {
         method.advance_duals(field, x, step)
     }
 }
@@ -174,7 +170,7 @@ impl<S: Stepped> SlicePlant<'_, S> {
         if parts.is_empty() || kind == Kind::Discrete {
             let field = Field { kind, interval: *interval, states: z.len(), rate, slopes };
             let mut step = self.intervals.step.get();
-            z.copy_from_slice(&S::advance(self.method, &field, z.to_vec(), &mut step)?);
+            S::advance(self.method, &field, z, &mut step)?;
             self.intervals.step.set(step);
             return Ok(());
         }
@@ -186,17 +182,16 @@ impl<S: Stepped> SlicePlant<'_, S> {
                 rate(position, z, to);
                 to.iter_mut().for_each(|to| *to *= length);
             };
-            let slopes = |position: f64, z: &[f64]| {
-                let (mut value, mut rows) = slopes(position, z);
-                value.iter_mut().chain(rows.iter_mut().flatten()).for_each(|entry| *entry *= length.value());
-                (value, rows)
+            let slopes = |position: f64, z: &[f64], value: &mut [f64], rows: &mut [f64]| {
+                slopes(position, z, value, rows);
+                value.iter_mut().chain(rows).for_each(|entry| *entry *= length.value());
             };
             let field = Field { kind, interval: (0.0, 1.0), states, rate: &rate, slopes: &slopes };
             let long = length.value() > 0.0;
             let mut step = if long { self.intervals.step.get() / length.value() } else { 0.0 };
-            let end = S::advance(self.method, &field, z.to_vec(), &mut step);
+            let reached = S::advance(self.method, &field, z, &mut step);
             part.set(None);
-            z.copy_from_slice(&end?);
+            reached?;
             if long {
                 self.intervals.step.set(step * length.value());
             }
@@ -229,11 +224,15 @@ impl<S: Stepped> Plant<S> for SlicePlant<'_, S> {
             crossing.state(state, self.between.u1.is_some(), |position, x, to| self.derivative(position, x, to));
             return Ok(());
         }
-        let p: Vec<Duals> = self.p.iter().map(|p| Dual::constant(p.value())).collect();
-        let slopes = |position: f64, x: &[f64]| {
+        // An explicit method does not ask for them.
+        let constants = OnceCell::new();
+        let slopes = |position: f64, x: &[f64], value: &mut [f64], rows: &mut [f64]| {
+            let p: &Vec<Duals> = constants.get_or_init(|| self.p.iter().map(|p| Dual::constant(p.value())).collect());
             let t = Dual::constant(self.between.time(position).value());
-            let u: Vec<Duals> = self.between.input(position).iter().map(|u| Dual::constant(u.value())).collect();
-            jacobian(x, &|x, to| self.duals.state(t, x, &u, &p, to))
+            let input = self.between.input(position);
+            let mut u = SmallVec::<[Duals; 4]>::from_elem(Dual::constant(0.0), input.len());
+            u.iter_mut().zip(&*input).for_each(|(to, u)| to.value = u.value());
+            jacobian(x, &|x, to| self.duals.state(t, x, &u, p, to), value, rows);
         };
         self.cross(self.layout.kind, state, &|position, x, to| self.derivative(position, x, to), &slopes)
     }
@@ -269,7 +268,7 @@ impl<S: Stepped> Plant<S> for SlicePlant<'_, S> {
     fn jump(&self, x: &mut [S]) {
         if self.jumps() && self.between.passes() {
             let (state, _) = x.split_at_mut(self.layout.states.len());
-            let before = state.to_vec();
+            let before = Short::from_slice(state);
             self.functions.jump(self.between.time(0.0), &before, &self.between.input(0.0), self.p, state);
         }
     }
@@ -301,17 +300,16 @@ impl<S: Stepped> Plant<S> for SlicePlant<'_, S> {
             rate(position, &lifted, &mut to);
             to.iter().map(Scalar::value).collect::<Vec<f64>>()
         };
-        let slopes = |position: f64, z: &[f64]| {
-            let columns = (0..z.len()).map(|j| {
+        let slopes = |position: f64, z: &[f64], value: &mut [f64], rows: &mut [f64]| {
+            value.copy_from_slice(&values(position, z));
+            for j in 0..z.len() {
                 let h = 6e-6 * z[j].abs().max(1e-3);
                 let (mut above, mut below) = (z.to_vec(), z.to_vec());
                 (above[j], below[j]) = (z[j] + h, z[j] - h);
                 let (a, b) = (values(position, &above), values(position, &below));
-                a.iter().zip(&b).map(|(a, b)| (a - b) / (above[j] - below[j])).collect::<Vec<f64>>()
-            });
-            let columns: Vec<Vec<f64>> = columns.collect();
-            let rows = (0..z.len()).map(|i| columns.iter().map(|column| column[i]).collect()).collect();
-            (values(position, z), rows)
+                let column = rows.iter_mut().skip(j).step_by(z.len());
+                column.zip(a.iter().zip(&b)).for_each(|(to, (a, b))| *to = (a - b) / (above[j] - below[j]));
+            }
         };
         self.cross(Kind::Continuous, z, rate, &slopes)
     }
@@ -339,22 +337,21 @@ pub(super) fn identity<S: Scalar>(n: usize) -> Vec<S> {
     (0..n * n).map(|at| S::from(f64::from(u8::from(at % (n + 1) == 0)))).collect()
 }
 
-/// Value of `f` and its Jacobian by rows, eight columns at a time.
-pub(crate) fn jacobian(x: &[f64], f: &dyn Fn(&[Duals], &mut [Duals])) -> (Vec<f64>, Vec<Vec<f64>>) {
+/// Writes the value of `f` and its Jacobian, row by row; eight columns at a time.
+pub(crate) fn jacobian(x: &[f64], f: &dyn Fn(&[Duals], &mut [Duals]), value: &mut [f64], rows: &mut [f64]) {
     const COLUMNS: usize = 8;
     let n = x.len();
-    let (mut value, mut rows) = (vec![0.0; n], vec![vec![0.0; n]; n]);
     for first in (0..n).step_by(COLUMNS) {
         let lane = |i: usize| i.checked_sub(first).unwrap_or(COLUMNS);
-        let seeded: Vec<Duals> = x.iter().enumerate().map(|(i, x)| Dual::variable(*x, lane(i))).collect();
-        let mut to = seeded.clone();
+        let none = Duals::constant(0.0);
+        let (mut seeded, mut to) = (Short::from_elem(none, n), Short::from_elem(none, n));
+        seeded.iter_mut().zip(x).enumerate().for_each(|(i, (to, x))| *to = Dual::variable(*x, lane(i)));
         f(&seeded, &mut to);
         for (i, dual) in to.iter().enumerate() {
             value[i] = dual.value;
-            for (entry, slope) in rows[i].iter_mut().skip(first).zip(dual.slopes) {
+            for (entry, slope) in rows[i * n..][..n].iter_mut().skip(first).zip(dual.slopes) {
                 *entry = slope;
             }
         }
     }
-    (value, rows)
 }

@@ -7,7 +7,7 @@ use crate::dual::Dual;
 use crate::functions::{Functions, delays};
 use crate::integrate::{Duals, Method, Stuck};
 use crate::layout::Layout;
-use crate::predict::{Between, Intervals, Prediction, SlicePlant, Stepped, Steps};
+use crate::predict::{Between, Intervals, Plant, Prediction, SlicePlant, Stepped, Steps};
 use crate::record::{Initial, Record};
 use crate::scalar::Scalar;
 
@@ -47,6 +47,8 @@ struct Pass<S> {
     p: Vec<S>,
     /// Dead times of the inputs, where there are any.
     delays: Vec<Option<S>>,
+    /// The outputs at a sample, of a simulation.
+    outputs: Vec<S>,
     intervals: Intervals<S>,
     first: usize,
     used: usize,
@@ -227,7 +229,8 @@ impl Filter<'_> {
 
     fn pass<S: Number>(&self, task: &Task<'_, S>, seeds: &[Seed], first: usize) -> Pass<S> {
         let pass = Pass::new(task.piece, seeds, first);
-        Pass { delays: delays(task.functions, &self.late, &pass.p), ..pass }
+        let outputs = vec![S::from(0.0); self.layout.outputs.len()];
+        Pass { delays: delays(task.functions, &self.late, &pass.p), outputs, ..pass }
     }
 
     /// Predicts the outputs of a sample, corrects the carry with the measured ones, and advances to the next sample.
@@ -247,6 +250,10 @@ impl Filter<'_> {
         let between = self.between((piece.record, piece.prepared), sample, &pass.delays);
         let plant = self.plant(functions, between, &pass.p, &pass.intervals);
         let columns = window.columns();
+        let is_simulated = self.predictor.is_simulation();
+        if is_simulated {
+            plant.output(&pass.carry, &mut pass.outputs);
+        }
         for (j, channel) in piece.record.outputs().iter().enumerate() {
             let y = if is_known { channel.values[sample] } else { f64::NAN };
             window.set_measured(k, j, u32::from(!y.is_nan()));
@@ -254,7 +261,10 @@ impl Filter<'_> {
                 window.clear_unmeasured_row(k, j);
                 continue;
             }
-            let (mean, variance) = steps.predict(&plant, &pass.carry, j);
+            let (mean, variance) = match is_simulated {
+                true => (pass.outputs[j], S::from(1.0)),
+                false => steps.predict(&plant, &pass.carry, j),
+            };
             let error = S::from(y) - mean;
             let write = |row: &mut [f64], value: &S, sign: f64| {
                 row[columns - 1] = value.value();
@@ -267,7 +277,9 @@ impl Filter<'_> {
             if window.has_variances() {
                 write(window.variance_row_mut(k, j), &variance, 1.0);
             }
-            steps.correct(&plant, &mut pass.carry, j, error);
+            if !is_simulated {
+                steps.correct(&plant, &mut pass.carry, j, error);
+            }
         }
         if restart.is_some() || sample + 1 >= piece.record.len() {
             return Ok(());
@@ -315,6 +327,15 @@ impl<S: Number> Pass<S> {
             piece.carry.iter().enumerate().map(|(entry, x)| S::with(*x, &|i| slope(entry, i))).collect();
         let parameters = piece.parameters.iter().enumerate();
         let p = parameters.map(|(j, p)| S::with(*p, &|i| f64::from(u8::from(moves(j, i))))).collect();
-        Pass { start: carry.clone(), carry, p, delays: vec![], intervals: Intervals::default(), first, used }
+        Pass {
+            start: carry.clone(),
+            carry,
+            p,
+            delays: vec![],
+            outputs: vec![],
+            intervals: Intervals::default(),
+            first,
+            used,
+        }
     }
 }

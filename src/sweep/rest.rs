@@ -69,7 +69,11 @@ impl Rest {
     pub fn near(filter: &Filter<'_>, record: &Record, state: &[f64], parameters: &[f64]) -> Result<Self, NotAtRest> {
         let p: Vec<Duals> = parameters.iter().map(|p| Dual::constant(*p)).collect();
         let between = Between::new(record, 0, &delays(filter.duals, &filter.late, &p));
-        let slopes = |x: &[f64]| jacobian(x, &|x, to| rate(filter, &between, x, &p, to));
+        let slopes = |x: &[f64]| {
+            let (mut f, mut rows) = (vec![0.0; x.len()], vec![0.0; x.len() * x.len()]);
+            jacobian(x, &|x, to| rate(filter, &between, x, &p, to), &mut f, &mut rows);
+            (f, rows)
+        };
         let moving = |f: &[f64], change: fn(f64) -> Change| {
             let largest = f.iter().enumerate().max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
             largest.map_or(NotAtRest { state: 0, change: Change::Rate(f64::NAN) }, |(state, f)| NotAtRest {
@@ -138,9 +142,9 @@ struct Inverse {
 ///
 /// # Errors
 /// The state on which no rate depends, alone or with others.
-fn inverse(rows: &[Vec<f64>], f: &[f64]) -> Result<Option<Inverse>, NotAtRest> {
-    let n = rows.len();
-    let a = DMatrix::from_fn(n, n, |i, j| rows[i][j]);
+fn inverse(rows: &[f64], f: &[f64]) -> Result<Option<Inverse>, NotAtRest> {
+    let n = f.len();
+    let a = DMatrix::from_row_slice(n, n, rows);
     if a.iter().chain(f).any(|entry| !entry.is_finite()) {
         return Ok(None);
     }
