@@ -53,14 +53,14 @@ impl<S: Scalar> Between<S> {
             let (u0, parts) = (record.late_inputs(k, delays), record.parts(k, delays));
             return Between { interval, crossed, u0: u0.into(), u1: None, parts, part };
         }
-        let inputs = record.inputs().iter().enumerate();
+        let inputs = record.inputs().iter();
         let at_end = |(i, input): (usize, &Channel)| match record.input_hold(i) {
             Hold::Zero => S::from(input.values[k]),
             Hold::First => S::from(input.values[k + 1]),
         };
         let moves = !record.holds.all_zero() && !last;
-        let u1 = moves.then(|| inputs.clone().map(at_end).collect());
-        let u0 = inputs.map(|(_, input)| S::from(input.values[k])).collect();
+        let u1 = moves.then(|| inputs.clone().enumerate().map(at_end).collect());
+        let u0 = inputs.map(|input| S::from(input.values[k])).collect();
         Between { interval, crossed, u0, u1, parts: vec![], part }
     }
 
