@@ -18,7 +18,7 @@ pub use automatic::Automatic;
 pub use discrete::Discrete;
 pub use esdirk::Esdirk;
 #[cfg(feature = "std")]
-pub(crate) use method::{Duals, Field, Method, Rate, Short, Slopes, SymbolicField, automatic, exact, stepped, stiff};
+pub(crate) use method::{Duals, Field, Method, Rate, Slopes, SymbolicField, automatic, exact, stepped, stiff};
 pub use rk4::Rk4;
 pub use rk45::Rk45;
 #[cfg(feature = "std")]

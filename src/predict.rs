@@ -24,7 +24,7 @@ pub use kalman::Kalman;
 pub use measured::Guess;
 pub(crate) use measured::Place;
 pub use plant::Plant;
-pub(crate) use plant::{Intervals, SlicePlant, Stepped, jacobian};
+pub(crate) use plant::{Intervals, SlicePlant, Stepped, value_and_slopes};
 pub use second_order::SecondOrder;
 pub use starting::Starting;
 pub(crate) use symbolic::{numbers, recurrence, settled};

@@ -9,7 +9,6 @@ use crate::layout::Kind;
 use crate::scalar::Scalar;
 use crate::signals::Entry;
 use core::fmt::Debug;
-use smallvec::{SmallVec, smallvec};
 use std::sync::Arc;
 
 /// Eight slopes at a time.
@@ -20,9 +19,6 @@ pub(crate) type Rate<'a, S> = &'a dyn Fn(f64, &[S], &mut [S]);
 
 /// `f(position, x, value, rows)`: writes a derivative and its Jacobian, row by row, at values of the states.
 pub(crate) type Slopes<'a> = &'a dyn Fn(f64, &[f64], &mut [f64], &mut [f64]);
-
-/// A vector of which a few entries need no allocation.
-pub(crate) type Short<T> = SmallVec<[T; 8]>;
 
 /// An interval of a system that is given by functions.
 pub(crate) struct Field<'a, S> {
@@ -38,7 +34,7 @@ pub(crate) struct Field<'a, S> {
 #[derive(Clone)]
 pub(crate) struct Rows {
     size: usize,
-    entries: SmallVec<[f64; 16]>,
+    entries: Vec<f64>,
 }
 
 impl Square for Rows {
@@ -52,7 +48,7 @@ impl Square for Rows {
 
 impl<S: Scalar> System for Field<'_, S> {
     type Scalar = S;
-    type Vector<T: Entry> = Short<T>;
+    type Vector<T: Entry> = Vec<T>;
     type Matrix = Rows;
 
     fn kind(&self) -> Kind {
@@ -63,29 +59,29 @@ impl<S: Scalar> System for Field<'_, S> {
         self.interval
     }
 
-    fn vector<T: Entry>(&self, f: impl FnMut(usize) -> T) -> Short<T> {
+    fn vector<T: Entry>(&self, f: impl FnMut(usize) -> T) -> Vec<T> {
         (0..self.states).map(f).collect()
     }
 
-    fn derivative(&self, position: f64, x: &Short<S>) -> Short<S> {
-        let mut to = smallvec![S::from(0.0); self.states];
+    fn derivative(&self, position: f64, x: &Vec<S>) -> Vec<S> {
+        let mut to = vec![S::from(0.0); self.states];
         (self.rate)(position, x, &mut to);
         to
     }
 
-    fn next(&self, x: &Short<S>) -> Short<S> {
+    fn next(&self, x: &Vec<S>) -> Vec<S> {
         self.derivative(0.0, x)
     }
 
-    fn jacobian(&self, position: f64, x: &Short<f64>) -> (Short<f64>, Rows) {
+    fn jacobian(&self, position: f64, x: &Vec<f64>) -> (Vec<f64>, Rows) {
         let size = self.states;
-        let mut value = smallvec![0.0; size];
-        let mut rows = Rows { size, entries: smallvec![0.0; size * size] };
+        let mut value = vec![0.0; size];
+        let mut rows = Rows { size, entries: vec![0.0; size * size] };
         (self.slopes)(position, x, &mut value, &mut rows.entries);
         (value, rows)
     }
 
-    fn along(&self, x: &Short<S>, part: f64, k: &Short<S>) -> Short<S> {
+    fn along(&self, x: &Vec<S>, part: f64, k: &Vec<S>) -> Vec<S> {
         let a = self.interval.1 * part;
         x.iter().zip(k).map(|(x, k)| x.plus_times(*k, a)).collect()
     }
@@ -198,7 +194,7 @@ impl System for SymbolicField<'_> {
     fn jacobian(&self, _position: f64, x: &Vec<f64>) -> (Vec<f64>, Rows) {
         Symbol::fail("its integrator asks for a Jacobian in numbers");
         let size = x.len();
-        (x.clone(), Rows { size, entries: smallvec![f64::NAN; size * size] })
+        (x.clone(), Rows { size, entries: vec![f64::NAN; size * size] })
     }
 
     fn along(&self, x: &Vec<Symbol>, part: f64, k: &Vec<Symbol>) -> Vec<Symbol> {
@@ -230,7 +226,7 @@ pub(crate) trait Method: Debug + Send + Sync {
 
 impl<I: Integrator> Method for I {
     fn advance_values(&self, field: &Field<'_, f64>, x: &mut [f64], step: &mut f64) -> Result<(), Stuck> {
-        x.copy_from_slice(&self.advance(field, Short::from_slice(x), step)?);
+        x.copy_from_slice(&self.advance(field, x.to_vec(), step)?);
         Ok(())
     }
 
@@ -242,7 +238,7 @@ impl<I: Integrator> Method for I {
             3 => advance_sized::<3>(self, field, x, step),
             4 => advance_sized::<4>(self, field, x, step),
             _ => {
-                x.copy_from_slice(&self.advance(field, Short::from_slice(x), step)?);
+                x.copy_from_slice(&self.advance(field, x.to_vec(), step)?);
                 Ok(())
             }
         }

@@ -5,10 +5,6 @@ use crate::record::{Channel, Part, Record};
 use crate::scalar::Scalar;
 use core::cell::Cell;
 use core::ops::Deref;
-use smallvec::SmallVec;
-
-/// A vector of which a few entries need no allocation.
-type Short<S> = SmallVec<[S; 4]>;
 
 /// From one sample of a record to the next.
 pub(crate) struct Between<S> {
@@ -16,9 +12,9 @@ pub(crate) struct Between<S> {
     pub(super) interval: (f64, f64),
     /// The length that its transition is computed for (s).
     pub(super) crossed: f64,
-    u0: Short<S>,
+    u0: Vec<S>,
     /// The input at the end; `None` where it is held.
-    pub(super) u1: Option<Short<S>>,
+    pub(super) u1: Option<Vec<S>>,
     /// Where an input is late: between its jumps.
     pub(super) parts: Vec<Part<S>>,
     /// The part that is being crossed.
@@ -28,7 +24,7 @@ pub(crate) struct Between<S> {
 /// The inputs at a position.
 pub(crate) enum Input<'b, S> {
     Held(&'b [S]),
-    Moving(Short<S>),
+    Moving(Vec<S>),
 }
 
 impl<S> Deref for Input<'_, S> {
@@ -51,7 +47,7 @@ impl<S: Scalar> Between<S> {
         let (interval, crossed, part) = ((t0, length), length, Cell::new(None));
         if !delays.is_empty() {
             let (u0, parts) = (record.late_inputs(k, delays), record.parts(k, delays));
-            return Between { interval, crossed, u0: u0.into(), u1: None, parts, part };
+            return Between { interval, crossed, u0, u1: None, parts, part };
         }
         let inputs = record.inputs().iter();
         let at_end = |(i, input): (usize, &Channel)| match record.input_hold(i) {

@@ -6,7 +6,7 @@ use crate::information::{Information, norm};
 use crate::integrate::Duals;
 use crate::layout::{Kind, Layout, Quantity};
 use crate::numeral::exact;
-use crate::predict::plant::{identity, jacobian};
+use crate::predict::plant::{identity, value_and_slopes};
 
 const LANES: usize = 8;
 const ITERATIONS: usize = 50;
@@ -211,13 +211,13 @@ impl Place<'_> {
     /// The slopes of the derivative (of the next state of a discrete model) with respect to the states, row by row.
     pub fn state_slopes(&self, x: &[f64]) -> Vec<f64> {
         let (t, u, p) = (Dual::constant(self.t), constants(self.u), constants(self.p));
-        slopes(x, &|x, to| self.functions.state(t, x, &u, &p, to))
+        value_and_slopes(x, &|x, to| self.functions.state(t, x, &u, &p, to)).1
     }
 
     /// The slopes of the state after a sample; `None` of a model whose samples leave it as it is.
     pub fn jump_slopes(&self, x: &[f64]) -> Option<Vec<f64>> {
         let (t, u, p) = (Dual::constant(self.t), constants(self.u), constants(self.p));
-        let of = || slopes(x, &|x, to| self.functions.jump(t, x, &u, &p, to));
+        let of = || value_and_slopes(x, &|x, to| self.functions.jump(t, x, &u, &p, to)).1;
         self.functions.jumps().then(of).filter(|found| *found != identity::<f64>(x.len()))
     }
 
@@ -252,13 +252,6 @@ fn shortest_step(information: &Information) -> Vec<f64> {
 
 fn names(quantities: &[Quantity]) -> String {
     quantities.iter().map(|quantity| quantity.name.as_str()).collect::<Vec<&str>>().join(", ")
-}
-
-/// The slopes of as many functions of the states, row by row.
-fn slopes(x: &[f64], f: &dyn Fn(&[Duals], &mut [Duals])) -> Vec<f64> {
-    let (mut value, mut rows) = (vec![0.0; x.len()], vec![0.0; x.len() * x.len()]);
-    jacobian(x, f, &mut value, &mut rows);
-    rows
 }
 
 fn constants(values: &[f64]) -> Vec<Duals> {

@@ -3,12 +3,11 @@
 use super::{Between, Moments};
 use crate::dual::Dual;
 use crate::functions::Functions;
-use crate::integrate::{Duals, Field, Method, Rate, Short, Slopes, Stuck};
+use crate::integrate::{Duals, Field, Method, Rate, Slopes, Stuck};
 use crate::layout::{Kind, Layout};
 use crate::scalar::Scalar;
 use crate::transition::{Crossing, Transition, squares};
 use core::cell::{Cell, OnceCell, RefCell};
-use smallvec::SmallVec;
 use std::rc::Rc;
 
 /// The model at one sample and in the interval to the next, with given parameters and inputs.
@@ -230,9 +229,9 @@ impl<S: Stepped> Plant<S> for SlicePlant<'_, S> {
             let p: &Vec<Duals> = constants.get_or_init(|| self.p.iter().map(|p| Dual::constant(p.value())).collect());
             let t = Dual::constant(self.between.time(position).value());
             let input = self.between.input(position);
-            let mut u = SmallVec::<[Duals; 4]>::from_elem(Dual::constant(0.0), input.len());
+            let mut u = vec![Dual::constant(0.0); input.len()];
             u.iter_mut().zip(&*input).for_each(|(to, u)| to.value = u.value());
-            jacobian(x, &|x, to| self.duals.state(t, x, &u, p, to), value, rows);
+            write_slopes(x, &|x, to| self.duals.state(t, x, &u, p, to), value, rows);
         };
         self.cross(self.layout.kind, state, &|position, x, to| self.derivative(position, x, to), &slopes)
     }
@@ -268,7 +267,7 @@ impl<S: Stepped> Plant<S> for SlicePlant<'_, S> {
     fn jump(&self, x: &mut [S]) {
         if self.jumps() && self.between.passes() {
             let (state, _) = x.split_at_mut(self.layout.states.len());
-            let before = Short::from_slice(state);
+            let before = state.to_vec();
             self.functions.jump(self.between.time(0.0), &before, &self.between.input(0.0), self.p, state);
         }
     }
@@ -337,14 +336,21 @@ pub(super) fn identity<S: Scalar>(n: usize) -> Vec<S> {
     (0..n * n).map(|at| S::from(f64::from(u8::from(at % (n + 1) == 0)))).collect()
 }
 
+/// The value of `f` and its Jacobian, row by row.
+pub(crate) fn value_and_slopes(x: &[f64], f: &dyn Fn(&[Duals], &mut [Duals])) -> (Vec<f64>, Vec<f64>) {
+    let (mut value, mut rows) = (vec![0.0; x.len()], vec![0.0; x.len() * x.len()]);
+    write_slopes(x, f, &mut value, &mut rows);
+    (value, rows)
+}
+
 /// Writes the value of `f` and its Jacobian, row by row; eight columns at a time.
-pub(crate) fn jacobian(x: &[f64], f: &dyn Fn(&[Duals], &mut [Duals]), value: &mut [f64], rows: &mut [f64]) {
+fn write_slopes(x: &[f64], f: &dyn Fn(&[Duals], &mut [Duals]), value: &mut [f64], rows: &mut [f64]) {
     const COLUMNS: usize = 8;
     let n = x.len();
     for first in (0..n).step_by(COLUMNS) {
         let lane = |i: usize| i.checked_sub(first).unwrap_or(COLUMNS);
         let none = Duals::constant(0.0);
-        let (mut seeded, mut to) = (Short::from_elem(none, n), Short::from_elem(none, n));
+        let (mut seeded, mut to) = (vec![none; n], vec![none; n]);
         seeded.iter_mut().zip(x).enumerate().for_each(|(i, (to, x))| *to = Dual::variable(*x, lane(i)));
         f(&seeded, &mut to);
         for (i, dual) in to.iter().enumerate() {

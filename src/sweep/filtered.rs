@@ -251,7 +251,7 @@ impl Filter<'_> {
         let plant = self.plant(functions, between, &pass.p, &pass.intervals);
         let columns = window.columns();
         let is_simulated = self.predictor.is_simulation();
-        if is_simulated {
+        if is_simulated && piece.record.outputs().iter().any(|channel| !channel.values[sample].is_nan()) {
             plant.output(&pass.carry, &mut pass.outputs);
         }
         for (j, channel) in piece.record.outputs().iter().enumerate() {

@@ -5,7 +5,7 @@ use crate::dual::Dual;
 use crate::functions::delays;
 use crate::integrate::Duals;
 use crate::layout::Kind;
-use crate::predict::{Between, jacobian};
+use crate::predict::{Between, value_and_slopes};
 use crate::record::Record;
 use nalgebra::{DMatrix, DVector};
 
@@ -69,11 +69,7 @@ impl Rest {
     pub fn near(filter: &Filter<'_>, record: &Record, state: &[f64], parameters: &[f64]) -> Result<Self, NotAtRest> {
         let p: Vec<Duals> = parameters.iter().map(|p| Dual::constant(*p)).collect();
         let between = Between::new(record, 0, &delays(filter.duals, &filter.late, &p));
-        let slopes = |x: &[f64]| {
-            let (mut f, mut rows) = (vec![0.0; x.len()], vec![0.0; x.len() * x.len()]);
-            jacobian(x, &|x, to| rate(filter, &between, x, &p, to), &mut f, &mut rows);
-            (f, rows)
-        };
+        let slopes = |x: &[f64]| value_and_slopes(x, &|x, to| rate(filter, &between, x, &p, to));
         let moving = |f: &[f64], change: fn(f64) -> Change| {
             let largest = f.iter().enumerate().max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
             largest.map_or(NotAtRest { state: 0, change: Change::Rate(f64::NAN) }, |(state, f)| NotAtRest {
