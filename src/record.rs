@@ -19,7 +19,7 @@ pub use column::{Channel, Column};
 pub use cycles::Gap;
 pub(crate) use delays::{NO_DEAD_TIME, Part, ROUNDING, is_dead_time};
 #[cfg(feature = "csv")]
-pub use file::{DataFile, DateOrder, FileFormat, Reading, TimeSource};
+pub use file::{DataFile, DateOrder, FileFormat, Header, Reading, TimeSource};
 pub(crate) use holds::Holds;
 pub(crate) use inspect::Looked;
 pub use inspect::{ChannelInspection, Inspection, Suspicion};

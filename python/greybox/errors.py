@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import re
 import sys
 import warnings
 
-__all__ = ["Error", "FitWarning", "ModelWarning", "RecordWarning", "TraceError", "warn"]
+__all__ = ["Error", "FitWarning", "ModelWarning", "RecordWarning", "TraceError", "in_python", "warn"]
 
 
 class Error(ValueError):
@@ -57,3 +58,20 @@ def warn(warning: Warning) -> None:
     while frame.f_back is not None and str(frame.f_globals.get("__name__", "")).partition(".")[0] == "greybox":
         frame, level = frame.f_back, level + 1
     warnings.warn(warning, stacklevel=level)
+
+
+def in_python(text: str) -> str:
+    """Give an error of the library's reader with the remedies that there are in Python."""
+    for theirs, ours in (
+        (
+            r'give DataFile::factor\("([^"]+)", ([^)]*)\) if it counts revolutions, or DataFile::factor\("[^"]+", ([^)]*)\) if',
+            r"give a frame in which `\1` is multiplied by \2 if it counts revolutions, or by \3 if",
+        ),
+        (r'DataFile::factor\("([^"]+)", ([^)]*)\), or 1 if', r"a frame in which `\1` is multiplied by \2, or by 1 if"),
+        (r'DataFile::unit\("([^"]+)", ("[^"]+")\), which', r"a frame in which `\1` is converted from \2, which"),
+        (r', which converts it, or DataFile::factor\("[^"]+", 1\) if', r", or a frame as it stands if"),
+        (r'give DataFile::factor\("[^"]+", 1\) if', r"give a frame as it stands if"),
+        (r'give DataFile::factor\("([^"]+)", \.\.\)', r"give a frame in which `\1` is converted"),
+    ):
+        text = re.sub(theirs, ours, text)
+    return text

@@ -11,7 +11,7 @@ import numpy as np
 from greybox import _core
 from greybox.errors import Error
 from greybox.estimate import VERDICTS
-from greybox.frames import Frame, is_readonly, rename, seconds, time_column
+from greybox.frames import Frame, is_readonly, place, rename, seconds, time_column
 from greybox.model import Model, checked
 from greybox.options import Options, settings
 from greybox.parameters import Parameter, declared, together
@@ -62,23 +62,30 @@ class Plan:
         if self.record.sample_time is not None:
             Frame({}).time(None, self.record.sample_time, 0)
         zeros = (np.zeros(2), False)
-        self.record.of(self.equations, "record", np.array([0.0, 1.0]), dict.fromkeys(self._signals(), zeros))
+        columns = {column: zeros for _, column, _ in self._signals()}
+        self.record.of(self.equations, "record", np.array([0.0, 1.0]), columns)
         _core.fleet(self.equations.core, [], self.declared, self.options, None)
 
-    def _signals(self) -> list[str]:
-        """Give the columns of inputs and outputs."""
-        signals = [*named(self.equations.inputs, "inputs"), *named(self.equations.outputs, "outputs")]
-        return list(dict.fromkeys(rename(signals, self.record.columns).values()))
+    def _signals(self) -> list[tuple[str, str, str]]:
+        """Give the name of each input and output, the column that is said of it, and its unit."""
+        inputs, outputs = named(self.equations.inputs, "inputs"), named(self.equations.outputs, "outputs")
+        of = rename([*inputs, *outputs], self.record.columns)
+        return [(signal, of[signal], unit) for signal, unit in [*inputs.items(), *outputs.items()]]
 
-    def needed(self) -> list[str]:
-        """Give the columns that are read, but for the time."""
-        return list(dict.fromkeys([*self.by, *self._signals()]))
+    def needed(self, names: Sequence[str]) -> list[str]:
+        """Give those of the columns of a frame that are read, but for the time.
 
-    def check(self, names: Sequence[str]) -> None:
-        """Refuse a frame of these columns if one of those that are read, but for the time, is missing."""
-        missing = [name for name in self.needed() if name not in names]
-        if missing:
-            raise Error(f"there is no column `{missing[0]}`; the frame has: {near(missing[0], names)}")
+        Raises
+        ------
+        Error
+            If one is missing, or has another unit than its signal.
+        """
+        keys = [(name, name if name in names else None) for name in self.by]
+        signals = [(column, place(names, column, signal, unit)) for signal, column, unit in self._signals()]
+        for wanted, found in [*keys, *signals]:
+            if found is None:
+                raise Error(f"there is no column `{wanted}`; the frame has: {near(wanted, names)}")
+        return list(dict.fromkeys(found for _, found in [*keys, *signals] if found is not None))
 
     def shuffled(self, names: Sequence[str]) -> list[str]:
         """Give those of the columns of a frame that a shuffle has to keep.
@@ -90,13 +97,13 @@ class Plan:
         """
         if self.record.sample_time is not None:
             raise Error("a shuffle does not keep the order of samples, which sample_time needs; add a column of the time")
-        self.check(names)
-        time = self.record.time or time_column(names)
+        needed = self.needed(names)
+        time = time_column(names, self.record.time)
+        if time is None and self.record.time is not None:
+            raise Error(f"there is no column `{self.record.time}`; the frame has: {near(self.record.time, names)}")
         if time is None:
             raise Error(f"there is no column `t` or `time`; the frame has: {near('t', names)}. Name the column by time=\"...\"")
-        if time not in names:
-            raise Error(f"there is no column `{time}`; the frame has: {near(time, names)}")
-        return list(dict.fromkeys([*self.needed(), time]))
+        return list(dict.fromkeys([*needed, time]))
 
     def columns(self) -> dict[str, type]:
         """Give the columns of the result beside those of `by`, with the kind of their values."""
@@ -123,12 +130,12 @@ class Plan:
         if isinstance(data, Path):
             raise Error(f"{data}: text files of many records are read by pandas: gb.fleet(model, pandas.read_csv({str(data)!r}), ...)")
         frame = Frame(data)
-        self.check(frame.names)
+        self.needed(frame.names)
         keys = [frame.values(name) for name in self.by]
         places, firsts = _groups(keys)
         of_record = {name: frame.rows(name, firsts) for name in self.by}
         labels = [", ".join(map(str, one)) for one in zip(*(_list(key) for key in of_record.values()), strict=True)]
-        columns = {name: frame.column(name, name) for name in self._signals()}
+        columns = {column: frame.column(column, signal, unit) for signal, column, unit in self._signals()}
         readonly = {name: is_readonly(column) for name, column in columns.items()}
         step = self.record.sample_time
         times, what = (np.zeros(0), "") if step is not None else frame.stamps(self.record.time)

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import mmap
-from collections.abc import Callable, Iterable, Mapping
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, TypeAlias
 
 import numpy as np
 
-from greybox.errors import Error
+from greybox import _core
+from greybox.errors import Error, in_python
 from greybox.signals import near
 
-__all__ = ["Array", "Frame", "Kind", "has_times", "is_readonly", "rename", "seconds", "time_column"]
+__all__ = ["Array", "Frame", "Kind", "has_times", "is_readonly", "place", "rename", "seconds", "time_column"]
 
 Array: TypeAlias = "np.ndarray[Any, np.dtype[np.float64]]"
 
@@ -60,21 +62,22 @@ class Frame:
     def __contains__(self, name: str) -> bool:
         return name in self.names
 
-    def column(self, name: str, signal: str) -> Array:
-        """Give a column as floating-point numbers; what is missing is NaN.
+    def column(self, name: str, signal: str, unit: str) -> Array:
+        """Give the column of a signal of this unit as floating-point numbers; what is missing is NaN.
 
         Raises
         ------
         Error
-            If there is no such column, or it has no numbers.
+            If there is no such column, it has another unit, or no numbers.
         """
-        if name not in self:
+        found = place(self.names, name, signal, unit)
+        if found is None:
             renamed = f" for `{signal}`" if signal != name else ""
             hint = f'; name another by columns={{"{signal}": "..."}}'
             raise Error(f"there is no column `{name}`{renamed}; the frame has: {near(name, self.names)}{hint}")
         if self._arrays is None:
-            return _numbers(self._frame.get_column(name), name)
-        return _array_numbers(self._arrays[name], name)
+            return _numbers(self._frame.get_column(found), found)
+        return _array_numbers(self._arrays[found], found)
 
     def values(self, name: str) -> Any:
         """Give a column as it is."""
@@ -118,35 +121,64 @@ class Frame:
             If there is none, or it is neither numbers nor dates. What is missing is refused by :func:`seconds`.
         """
         index = getattr(self.index, "name", None)
-        if name is None:
-            name = time_column(self.names)
-            if name is None and self.index is None:
-                raise Error(
-                    f"there is no column `t` or `time`, and no index of times; the frame has: {near('t', self.names)}. Name the column "
-                    'by time="...", or give the time between samples (s) by sample_time=...'
-                )
-        if name is None or (name not in self and name == index):
+        found = time_column(self.names, name)
+        if found is None and name is None and self.index is None:
+            raise Error(
+                f"there is no column `t` or `time`, and no index of times; the frame has: {near('t', self.names)}. Name the column "
+                'by time="...", or give the time between samples (s) by sample_time=...'
+            )
+        if found is None and name in (None, index):
             what = "the index" if index is None else f"the index `{index}`"
-            return _stamps(self.index, what), what
-        if name not in self:
-            raise Error(f"there is no column `{name}` for the time; the frame has: {near(name, self.names)}")
-        what = f"column `{name}`"
+            return _counted(_stamps(self.index, what), str(index or "t")), what
+        if found is None:
+            raise Error(f"there is no column `{name}` for the time; the frame has: {near(str(name), self.names)}")
+        what = f"column `{found}`"
         if self._arrays is not None:
-            return _stamps(self._arrays[name], what), what
-        column = self._frame.get_column(name)
+            return _counted(_stamps(self._arrays[found], what), found), what
+        column = self._frame.get_column(found)
         dated = _dated(column)
-        return (_stamps(column.to_numpy(), what) if dated is None else dated), what
+        return (_counted(_stamps(column.to_numpy(), what), found) if dated is None else dated), what
 
 
-def time_column(names: Iterable[str]) -> str | None:
-    """Give the column of the time by its usual names; `None` if there is none."""
-    there = set(names)
-    return next((one for one in _TIMES if one in there), None)
+def place(names: Sequence[str], column: str, signal: str, unit: str) -> str | None:
+    """Give the column of this name, with a unit behind it or without, that holds a signal of a unit; `None` if there is none.
+
+    Raises
+    ------
+    Error
+        If there are several, or the column says a unit that is known and not that of the signal.
+    """
+    try:
+        at = _core.Header(list(names)).column(column, signal, unit)
+    except Error as error:
+        stands = r", or (by 1|(give )?a frame as it stands) if the file's unit is wrong"
+        raise Error(re.sub(stands, ", or rename the column if its unit is wrong", in_python(str(error)))) from None
+    return None if at is None else names[at]
+
+
+def time_column(names: Sequence[str], said: str | None = None) -> str | None:
+    """Give the column of the time, of this name or of a usual one, with a unit behind it or without; `None` if there is none."""
+    usual = next((one for one in _TIMES if one in names), None) if said is None else None
+    if usual is not None:
+        return usual
+    at = _core.Header(list(names)).time(said)
+    return None if at is None else names[at]
+
+
+def _counted(stamps: Any, name: str) -> Any:
+    """Give times in seconds if they are numbers in the unit that the name of their column says, or since 1970."""
+    if stamps.dtype.kind == "m":
+        return stamps
+    try:
+        unit, origin = _core.Header([name]).seconds(0, float(stamps[0]) if len(stamps) else 0.0)
+    except Error as error:
+        raise Error(in_python(str(error))) from None
+    return stamps if (unit, origin) == (1.0, 0.0) else (stamps - origin) * unit
 
 
 def has_times(data: Any) -> bool:
     """Whether a frame has a column of the time, or an index of times."""
-    return time_column(map(str, data.columns)) is not None or _index(data) is not None
+    return time_column(list(map(str, data.columns))) is not None or _index(data) is not None
 
 
 class Native:

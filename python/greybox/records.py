@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -12,9 +11,9 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 
 from greybox import _core
-from greybox.errors import Error
+from greybox.errors import Error, in_python
 from greybox.files import TEXT, read
-from greybox.frames import Array, Frame, Kind, is_readonly, rename
+from greybox.frames import Array, Frame, Kind, is_readonly, place, rename
 from greybox.model import Equations
 from greybox.parameters import Parameter, said
 from greybox.signals import Signals, named
@@ -36,13 +35,14 @@ class Record:
     ----------
     data : frame
         pandas, polars, Arrow (or whatever hands over an Arrow stream), a mapping from names to arrays, an xarray dataset, or a
-        structured array. A row for each sample; further columns are ignored. Or the path of a file: of text with columns (``.csv``), in
+        structured array. A row for each sample, a column for each signal, of its name, with a unit behind it or without (``u [V]``); a known
+        unit that is not the signal's is refused; further columns are ignored. Or the path of a file: of text with columns (``.csv``), in
         which what is not said is found, or of a kind that :func:`greybox.read` reads.
     name : str, optional
         The name in reports and errors; without it that of the file, without its ending.
     time : str, optional
-        The column of the time: seconds, or dates, which count from the first. Without it, the column ``t`` or ``time``, or else the
-        index of a pandas frame.
+        The column of the time: dates, which count from the first, or numbers in seconds or in the unit that its name says (``t [ms]``,
+        ``time_ms``). Without it, the column ``t`` or ``time``, with a unit or without, or else the index of a pandas frame.
     sample_time : float, optional
         The time between samples (s), where there is no column.
     columns : mapping from str to str, optional
@@ -87,17 +87,17 @@ class Record:
             try:
                 record = _core.Record.from_csv(equations.core, name, data, columns_, self.sample_time)
             except Error as error:
-                raise Error(_in_python(str(error))) from None
+                raise Error(in_python(str(error))) from None
             return self._said(equations, record)
         frame = Frame(data)
         try:
             of = rename([*inputs, *measured], self.columns)
-            columns = {signal: _column(frame, of[signal], signal) for signal in inputs}
+            columns = {signal: frame.column(of[signal], signal, unit) for signal, unit in inputs.items()}
             rows = len(next(iter(columns.values()))) if columns else None
             found: dict[str, Array] = {}
-            for signal in measured:
-                if outputs or of[signal] in frame:
-                    found[signal] = _column(frame, of[signal], signal)
+            for signal, unit in measured.items():
+                if outputs or place(frame.names, of[signal], signal, unit) is not None:
+                    found[signal] = frame.column(of[signal], signal, unit)
                     rows = len(found[signal])
             rows = 0 if rows is None else rows
             time = frame.time(self.time, self.sample_time, rows)
@@ -125,23 +125,6 @@ class Record:
         return equations.prepared(record).said(hold, initial)
 
 
-def _in_python(text: str) -> str:
-    """Give an error of the library's reader with the remedies that there are in Python."""
-    for theirs, ours in (
-        (
-            r'give DataFile::factor\("([^"]+)", ([^)]*)\) if it counts revolutions, or DataFile::factor\("[^"]+", ([^)]*)\) if',
-            r"give a frame in which `\1` is multiplied by \2 if it counts revolutions, or by \3 if",
-        ),
-        (r'DataFile::factor\("([^"]+)", ([^)]*)\), or 1 if', r"a frame in which `\1` is multiplied by \2, or by 1 if"),
-        (r'DataFile::unit\("([^"]+)", ("[^"]+")\), which', r"a frame in which `\1` is converted from \2, which"),
-        (r', which converts it, or DataFile::factor\("[^"]+", 1\) if', r", or a frame as it stands if"),
-        (r'give DataFile::factor\("[^"]+", 1\) if', r"give a frame as it stands if"),
-        (r'give DataFile::factor\("([^"]+)", \.\.\)', r"give a frame in which `\1` is converted"),
-    ):
-        text = re.sub(theirs, ours, text)
-    return text
-
-
 def opened(data: Any) -> Any:
     """Give the frame in a file, where a path stands in its place; of a text file the path, which the compiled library reads."""
     if not is_path(data):
@@ -167,10 +150,6 @@ def kind_of(data: Any) -> Kind:
 
 def _states(equations: Equations) -> Signals:
     return named(equations.states, "states")
-
-
-def _column(frame: Frame, column: str, signal: str) -> Array:
-    return frame.column(column, signal)
 
 
 def _shared(array: Array) -> tuple[Array, bool]:

@@ -71,18 +71,24 @@ def fleet(
             "spark.createDataFrame(frame)"
         )
     made = plan(model, by, parameters, Record(None, None, time, sample_time, columns, hold, initial), given)
-    needed = made.shuffled(frame.columns)
-    keys = [f"`{name}` {frame.schema[name].dataType.simpleString()}" for name in made.by]
+    samples = frame.select(*map(_quoted, made.shuffled(frame.columns)))
+    by = [_quoted(name) for name in made.by]
+    keys = [f"{_quoted(name)} {frame.schema[name].dataType.simpleString()}" for name in made.by]
     schema = ", ".join(keys + [f"`{name}` {_TYPES[kind]}" for name, kind in made.columns().items()])
     fit = _worker(made)
     if whole:
-        return frame.select(*needed).mapInArrow(_partition(fit), schema)
+        return samples.mapInArrow(_partition(fit), schema)
     if batches is None:
-        records = frame.select(*made.by).distinct().count()
+        records = frame.select(*by).distinct().count()
         cores = frame.sparkSession.sparkContext.defaultParallelism
         batches = cores * max(1, -(-records // (_BATCH * cores)))
     # A number that is asked for is not changed by adaptive execution, which would make one task of many small parts.
-    return frame.select(*needed).repartition(batches, *made.by).mapInArrow(_partition(fit), schema)
+    return samples.repartition(batches, *by).mapInArrow(_partition(fit), schema)
+
+
+def _quoted(name: str) -> str:
+    """Give the name of a column as Spark reads it, whatever letters it has."""
+    return f"`{name.replace('`', '``')}`"
 
 
 def _worker(made: Plan) -> Callable[[Any], Any]:

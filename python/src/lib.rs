@@ -8,6 +8,7 @@ mod equations;
 mod estimate;
 mod fleet;
 mod graph;
+mod header;
 mod problem;
 mod record;
 mod remedies;
@@ -25,6 +26,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<graph::Table>()?;
     module.add_class::<graph::Expression>()?;
     module.add_class::<equations::Equations>()?;
+    module.add_class::<header::Header>()?;
     module.add_class::<record::Record>()?;
     module.add_class::<text::TextModel>()?;
     module.add_class::<settings::Parameter>()?;

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime
+import re
 from collections.abc import Callable
 from typing import Any
 
@@ -103,6 +104,64 @@ def test_time_by_name_and_by_rate() -> None:
     assert k_of(pd.DataFrame({**c}).rename(columns={"t": "Time"})) == k_of(c)
     assert k_of({"room": c["room"], "body": c["body"]}, sample_time=0.1) == k_of(c)
     assert k_of({**c, "T_body": c["body"], "body": np.zeros(200)}, columns={"body": "T_body"}) == k_of(c)
+
+
+@pytest.mark.parametrize(
+    ("name", "scale", "said"),
+    [
+        ("t [ms]", 1e3, None),
+        ("time (us)", 1e6, None),
+        ("t / min", 1 / 60, None),
+        ("time_ms", 1e3, None),
+        ("Zeit [h]", 1 / 3600, None),
+        ("clock [ms]", 1e3, "clock"),
+        ("clock [ms]", 1e3, "clock [ms]"),
+        ("clock_ms", 1e3, "clock_ms"),
+    ],
+)
+def test_a_time_is_in_the_unit_that_its_name_says(name: str, scale: float, said: str | None) -> None:
+    c = cooled()
+    frame = pd.DataFrame({name: c["t"] * scale, "room": c["room"], "body": c["body"]})
+    assert abs(k_of(frame, time=said) / k_of(c) - 1) < 1e-12
+    several = pd.concat([frame.assign(which=k) for k in "ab"])
+    rows = gb.fleet(cooling(), several, by="which", k=gb.free(1.0), time=said)
+    assert (abs(rows["k"] / k_of(c) - 1) < 1e-9).all()
+    if said is None:
+        assert abs(k_of(frame.set_index(name)) / k_of(c) - 1) < 1e-12
+
+
+def test_numbers_since_1970_are_recognized() -> None:
+    c = cooled()
+    stamps = (1_742_480_000_000 + (c["t"] * 1e3).round()).astype(np.int64)
+    assert abs(k_of({**c, "t": stamps}) / k_of(c) - 1) < 1e-9
+
+
+def test_columns_may_say_the_unit_of_their_signal() -> None:
+    c = cooled()
+    frame = {"t [s]": c["t"], "room [K]": c["room"], "body / K": c["body"]}
+    assert k_of(frame) == k_of(c)
+    assert k_of({"t": c["t"], "air [K]": c["room"], "body": c["body"]}, columns={"room": "air"}) == k_of(c)
+    # An exact name comes first.
+    assert k_of({**frame, "room": c["room"], "room [K]": c["room"] * 2}) == k_of(c)
+    rows = gb.fleet(cooling(), {**frame, "which": np.zeros(200, int)}, by="which", k=gb.free(1.0))
+    assert abs(rows["k"][0] / k_of(c) - 1) < 1e-9
+
+
+REFUSED: list[tuple[dict[str, str], str]] = [
+    ({"room": "room [mK]"}, "column `room [mK]` is in \"mK\" and signal `room` in \"K\"; give a frame in which `room` is multiplied by 0.001, or rename the column if its unit is wrong"),
+    ({"room": "room [degC]"}, "column `room [degC]` is in \"degC\" and signal `room` in \"K\"; their zeros differ: give a frame in which `room` is converted from \"degC\", or rename the column if its unit is wrong"),
+    ({"t": "t [samples]"}, "column `t [samples]` has times in `samples`, no unit of time that is known: give a frame with times in seconds"),
+]
+
+
+@pytest.mark.parametrize(("names", "says"), REFUSED)
+def test_units_that_do_not_fit_are_refused(names: dict[str, str], says: str) -> None:
+    frame = pd.DataFrame(cooled()).rename(columns=names)
+    with pytest.raises(gb.Error, match=re.escape(says)) as error:
+        k_of(frame)
+    assert "DataFile" not in str(error.value)
+    with pytest.raises(gb.Error, match=re.escape(says)):
+        gb.fleet(cooling(), frame.assign(which=1), by="which", k=gb.free(1.0))
 
 
 def test_missing_outputs_are_left_out() -> None:

@@ -7,6 +7,7 @@ mod dates;
 mod format;
 mod groups;
 mod guess;
+mod header;
 mod numbers;
 mod read;
 mod reading;
@@ -16,6 +17,7 @@ mod timing;
 mod write;
 
 pub use format::FileFormat;
+pub use header::Header;
 pub use reading::{DateOrder, Reading, TimeSource};
 
 use super::Record;

@@ -63,6 +63,7 @@ fn a_factor_decides_the_unit() {
     assert_eq!(read("kept", "t [min]", Some(1.0)), (1.0, "1 min".to_owned()));
     assert_eq!(read("hours", "time", Some(3600.0)), (3600.0, "1 h".to_owned()));
     assert_eq!(read("milliseconds", "time_ms", None), (1e-3, "1 ms".to_owned()));
+    assert_eq!(read("clock", "clock_ms", None), (1e-3, "1 ms".to_owned()));
     assert_eq!(read("ticks", "time", Some(0.125)), (0.125, "0.125 s".to_owned()));
     let record =
         Experiment::from_file(&Pmsm, file("cycles", "t", &TIMES)).unwrap().time_in(TimeUnit::of_model("cycles"));

@@ -197,7 +197,7 @@ impl DataFile {
     }
 
     /// The column of a signal, in the signal's unit if the file says one.
-    fn source<'b>(
+    pub(super) fn source<'b>(
         &self,
         names: &[String],
         below: impl Fn(usize) -> Option<&'b str>,

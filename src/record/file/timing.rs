@@ -88,7 +88,7 @@ impl DataFile {
             return found;
         }
         // Units stand behind an underscore, too.
-        let with_unit = || are(&|name| suffix(name).is_some());
+        let with_unit = || are(&|name| suffix(name, false).is_some());
         for found in [called(&NAMES), over(), with_unit(), called(&DATES)] {
             if let [only] = found[..] {
                 return Ok(only);
@@ -119,7 +119,7 @@ impl DataFile {
             .as_deref()
             .or(split_unit(name).1)
             .or_else(|| over_time(name).map(|(_, unit)| unit))
-            .or_else(|| suffix(name))
+            .or_else(|| suffix(name, said.name.is_some()))
             .or(below)
             .map(str::trim);
         let written = written.filter(|text| !NO_UNITS.contains(&text.to_lowercase().as_str()));
@@ -225,11 +225,11 @@ fn shown(named: Option<TimeUnit>, factor: f64) -> TimeUnit {
     }
 }
 
-/// A unit of time behind the name of a column of time: `time_ms`, `time ms`.
-fn suffix(name: &str) -> Option<&str> {
+/// A unit of time behind the name of a column of time: `time_ms`, `time ms`; of any name, where it was said that it is the column of time.
+fn suffix(name: &str, is_time: bool) -> Option<&str> {
     let (before, unit) = name.rsplit_once(['_', ' '])?;
     let before = plain(before);
-    (time_unit(unit).is_some() && (before == "t" || NAMES.contains(&before.as_str()))).then_some(unit)
+    (time_unit(unit).is_some() && (is_time || before == "t" || NAMES.contains(&before.as_str()))).then_some(unit)
 }
 
 impl Timing {
