@@ -67,7 +67,7 @@ pub enum About {
 pub enum WarningCode {
     /// No more measurements than unknowns.
     TooFewMeasurements,
-    /// The data determine none of the unknowns.
+    /// The data determine none of the parameters, or, of a fit without any, none of the unknowns.
     NothingDetermined,
     /// An output that never moves.
     ConstantOutput,

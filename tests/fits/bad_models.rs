@@ -139,6 +139,12 @@ fn parameters_known_only_as_a_ratio_are_named_with_the_direction() {
         // The ratio itself is right to five of its standard errors.
         assert_relative_eq!(estimate.parameters.a / estimate.parameters.b, 3.0, max_relative = 5e-3);
     }
+    // An initial state that is known makes no parameter known.
+    let record = record.initial(Position { x: free(0.1) });
+    let estimate = Fit::new(&Ratio, &record).parameters(free_pair(2.0, 1.0)).run().unwrap();
+    warns(&estimate, &["`a`, `b` are known only together", "the data determine none of the parameters"]);
+    assert!(estimate.unknowns[2].knowledge.standard_error().is_some_and(|error| error < 1e-3));
+    assert_eq!(estimate.severity(), Severity::NotUsable);
 }
 
 #[test]

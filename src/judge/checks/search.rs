@@ -120,7 +120,7 @@ fn warnings(
 
 pub(crate) const ENOUGH: Check = Check::new(
     "measurements determine the unknowns",
-    "Are there more measurements than unknowns, and does one unknown at least have an interval?",
+    "Are there more measurements than unknowns, and does one parameter at least have an interval?",
     &[WarningCode::TooFewMeasurements, WarningCode::NothingDetermined],
     |evidence, intervals| of_the_data(evidence, &intervals.unknowns).into(),
 );
@@ -135,8 +135,18 @@ fn of_the_data(evidence: &Evidence<'_>, unknowns: &[Unknown]) -> Option<Warning>
         );
         return Some(not_usable(WarningCode::TooFewMeasurements, text));
     }
-    let none = unknowns.iter().all(|row| row.knowledge == Knowledge::Unidentified);
-    none.then(|| not_usable(WarningCode::NothingDetermined, "the data determine none of the unknowns".to_owned()))
+    let parameters = || unknowns.iter().filter(|row| matches!(row.role, Role::Parameter(_)));
+    let (sought, what): (Vec<&Unknown>, &str) = match parameters().next() {
+        Some(_) => (parameters().collect(), "parameters"),
+        None => (unknowns.iter().collect(), "unknowns"),
+    };
+    let none = sought.iter().all(|row| row.knowledge == Knowledge::Unidentified);
+    let text = || {
+        format!(
+            "the data determine none of the {what}; fix some that are known from elsewhere, or excite the system differently"
+        )
+    };
+    none.then(|| not_usable(WarningCode::NothingDetermined, text()))
 }
 
 pub(crate) const TIME: Check = Check::new(
