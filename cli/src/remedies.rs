@@ -116,8 +116,8 @@ mod tests {
             options.any(|option| option.get_long() == Some(word))
         };
         // These have arguments that are words of a sentence there.
-        let records = std::fs::read_to_string(root.join("python/greybox/records.py")).unwrap();
-        let by_records = ["DataFile::factor", "DataFile::unit"].map(|name| records.contains(name).then_some(name));
+        let errors = std::fs::read_to_string(root.join("python/greybox/errors.py")).unwrap();
+        let by_errors = ["DataFile::factor", "DataFile::unit"].map(|name| errors.contains(name).then_some(name));
         let mut sentences = vec![];
         collect(&root.join("src"), &mut sentences);
         let mut named = 0;
@@ -127,7 +127,7 @@ mod tests {
             let left = names(&shell);
             assert!(left.iter().all(|name| OF_PROGRAMS.contains(&name.as_str())), "the shell: {left:?} in {text}");
             let left = names(&python).into_iter();
-            let left: Vec<String> = left.filter(|name| !by_records.contains(&Some(name.as_str()))).collect();
+            let left: Vec<String> = left.filter(|name| !by_errors.contains(&Some(name.as_str()))).collect();
             assert!(left.iter().all(|name| OF_PROGRAMS.contains(&name.as_str())), "Python: {left:?} in {text}");
             for (at, _) in shell.match_indices("--").filter(|_| shell != *text) {
                 let end = |letter: char| !letter.is_alphanumeric() && letter != '-' && letter != '_';

@@ -2,7 +2,7 @@
 
 use greybox::text::renamed;
 
-/// Functions of the library, and the arguments that do the same, with what they are given; `records.py` has those whose
+/// Functions of the library, and the arguments that do the same, with what they are given; `errors.py` has those whose
 /// arguments stand elsewhere in the sentence. Of names of which one begins with the other, the longer one stands first.
 const NAMES: &[(&str, &str)] = &[
     (", filter the restarts (Horizon::filtered), or take", ", or take"),

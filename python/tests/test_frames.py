@@ -164,6 +164,15 @@ def test_units_that_do_not_fit_are_refused(names: dict[str, str], says: str) -> 
         gb.fleet(cooling(), frame.assign(which=1), by="which", k=gb.free(1.0))
 
 
+def test_letters_behind_an_underscore_are_a_unit_where_the_signal_has_one_of_another_size() -> None:
+    c = cooled()
+    said = {"room": "air_mean", "body": "body_K"}
+    frame = {"t": c["t"], "air_mean": c["room"], "body_K": c["body"], "air_degC": c["room"]}
+    assert k_of(frame, columns=said) == k_of(c)
+    with pytest.raises(gb.Error, match="column `air_degC` is in \"degC\" and signal `room` in \"K\""):
+        k_of(frame, columns={**said, "room": "air_degC"})
+
+
 def test_missing_outputs_are_left_out() -> None:
     c = cooled()
     c["body"][50:60] = np.nan

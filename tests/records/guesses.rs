@@ -206,6 +206,12 @@ fn a_column_in_another_unit_is_refused() {
     // Also where the column is named with its unit.
     says(DataFile::new(&path).column("w", "w [rpm]").read(&Pmsm), &["column `w [rpm]`", "0.10471975511965977"]);
     assert_eq!(DataFile::new(path).factor("w", 0.5).read(&Pmsm).unwrap().input(0).w, 1.0);
+    // And behind an underscore; letters that are no unit of another size than the signal's are a part of the name.
+    let path = file("units", "t,u_ref,speed_rpm,i_d,i_in\n0,1,2,3,4\n1,1,2,3,4\n");
+    let columns = [("ud", "u_ref"), ("w", "speed_rpm"), ("id", "i_d"), ("iq", "i_in")];
+    let named = columns.iter().fold(DataFile::new(path), |file, (signal, column)| file.column(signal, column));
+    says(named.clone().read(&Pmsm), &["column `speed_rpm` is in \"rpm\"", "0.10471975511965977"]);
+    assert_eq!(named.unit("w", "rad/s").read(&Pmsm).unwrap().input(0).w, 2.0);
 }
 
 /// A quantity over its unit, as standards write it, and a unit of time behind a space.

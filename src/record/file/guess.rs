@@ -202,6 +202,12 @@ pub(super) fn over_unit(name: &str) -> Option<(&str, &str)> {
     (!before.is_empty() && is_unit(unit)).then_some((before, unit))
 }
 
+/// What may be a unit behind a name: `speed_rpm`, `current mA`. A single letter is mostly a place or a phase: `T_h`, `i_d`.
+pub(super) fn behind_name(name: &str) -> Option<&str> {
+    let (_, unit) = name.rsplit_once(['_', ' '])?;
+    (unit.chars().count() > 1).then_some(unit)
+}
+
 /// Whether a cell holds a number, in any notation, a date, or says that there is none.
 pub(super) fn is_value(cell: &str) -> bool {
     is_missing(cell.as_bytes()) || cell.replacen(',', ".", 1).parse::<f64>().is_ok() || Stamp::read(cell).is_some()

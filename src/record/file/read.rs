@@ -2,7 +2,7 @@
 
 use super::bytes::decoded;
 use super::columns;
-use super::guess::{over_unit, split_unit};
+use super::guess::{behind_name, over_unit, split_unit};
 use super::numbers::Numbers;
 use super::table::Table;
 use super::timing::Timing;
@@ -211,7 +211,14 @@ impl DataFile {
         let over = || over_unit(name).filter(|(name, _)| *name == said.name()).map(|(_, unit)| unit);
         let written = split_unit(name).1.or_else(over).filter(|_| *name != signal.name);
         let (mut factor, mut offset) = (said.factor.unwrap_or(1.0), said.offset);
-        let of_file = said.unit.as_deref().or(written).or_else(|| below(column));
+        // Letters behind an underscore may be a part of the name, and count only where the signal's unit is of another size.
+        let behind = || {
+            let other =
+                |unit: &&str| matches!(relation(unit, &signal.unit), Relation::Factor(_) | Relation::OtherZero { .. });
+            behind_name(name).filter(|_| *name != signal.name).filter(other)
+        };
+        let below = below(column).filter(|unit| !unit.is_empty());
+        let of_file = said.unit.as_deref().or(written).or(below).or_else(behind);
         if let Some(file) = of_file.filter(|_| said.factor.is_none()) {
             let refused = |factor: Option<f64>| {
                 let (path, column, signal_name) = (self.path.clone(), name.clone(), signal.name.clone());
