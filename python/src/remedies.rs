@@ -22,7 +22,7 @@ const NAMES: &[(&str, &str)] = &[
     (".log()", "log=True"),
     (".per_experiment()", "per_experiment=True"),
     (".positive()", "positive=True"),
-    ("say how many seconds one is by DataFile::factor(\"t\", ..)", "give a frame with times in seconds"),
+    ("say how many seconds one is by DataFile::factor(\"t\", ..)", "give a frame with a column `t` of seconds"),
     ("DataFile::column", "columns={\"signal\": \"column\"}, or time=\"column\""),
     ("DataFile::dates", "pandas.to_datetime and its dayfirst"),
     ("DataFile::decimal_comma", "decimal=\",\" of pandas.read_csv"),

@@ -150,7 +150,7 @@ def test_columns_may_say_the_unit_of_their_signal() -> None:
 REFUSED: list[tuple[dict[str, str], str]] = [
     ({"room": "room [mK]"}, "column `room [mK]` is in \"mK\" and signal `room` in \"K\"; give a frame in which `room` is multiplied by 0.001, or rename the column if its unit is wrong"),
     ({"room": "room [degC]"}, "column `room [degC]` is in \"degC\" and signal `room` in \"K\"; their zeros differ: give a frame in which `room` is converted from \"degC\", or rename the column if its unit is wrong"),
-    ({"t": "t [samples]"}, "column `t [samples]` has times in `samples`, no unit of time that is known: give a frame with times in seconds"),
+    ({"t": "t [samples]"}, "column `t [samples]` has times in `samples`, no unit of time that is known: give a frame with a column `t` of seconds"),
 ]
 
 
