@@ -120,16 +120,16 @@ class Frame:
         Error
             If there is none, or it is neither numbers nor dates. What is missing is refused by :func:`seconds`.
         """
-        index = getattr(self.index, "name", None)
+        index = None if getattr(self.index, "name", None) is None else str(self.index.name)
         found = time_column(self.names, name)
         if found is None and name is None and self.index is None:
             raise Error(
                 f"there is no column `t` or `time`, and no index of times; the frame has: {near('t', self.names)}. Name the column "
                 'by time="...", or give the time between samples (s) by sample_time=...'
             )
-        if found is None and name in (None, index):
+        if found is None and (name is None or (index is not None and time_column([index], name) is not None)):
             what = "the index" if index is None else f"the index `{index}`"
-            return _counted(_stamps(self.index, what), str(index or "t")), what
+            return _counted(_stamps(self.index, what), index or "t"), what
         if found is None:
             raise Error(f"there is no column `{name}` for the time; the frame has: {near(str(name), self.names)}")
         what = f"column `{found}`"

@@ -188,7 +188,9 @@ def test_dask_with_a_worker_killed(
 def ray() -> Iterator[Any]:
     ray = pytest.importorskip("ray")
     pytest.importorskip("ray.data")
-    # Workers find the tests' modules by the path of this process.
+    # Workers have a low priority, and would wait for programs that run beside the tests.
+    os.environ["RAY_worker_niceness"] = "0"
+    # They find the tests' modules by the path of this process.
     path = {"env_vars": {"PYTHONPATH": ":".join(sys.path)}}
     ray.init(num_cpus=2, include_dashboard=False, logging_level="ERROR", log_to_driver=False, runtime_env=path)
     context = ray.data.DataContext.get_current()

@@ -126,8 +126,7 @@ def test_a_time_is_in_the_unit_that_its_name_says(name: str, scale: float, said:
     several = pd.concat([frame.assign(which=k) for k in "ab"])
     rows = gb.fleet(cooling(), several, by="which", k=gb.free(1.0), time=said)
     assert (abs(rows["k"] / k_of(c) - 1) < 1e-9).all()
-    if said is None:
-        assert abs(k_of(frame.set_index(name)) / k_of(c) - 1) < 1e-12
+    assert abs(k_of(frame.set_index(name), time=said) / k_of(c) - 1) < 1e-12
 
 
 def test_numbers_since_1970_are_recognized() -> None:
