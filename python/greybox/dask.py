@@ -71,6 +71,7 @@ def fleet(
     if given.get("sample_time") is not None:
         raise Error("a shuffle does not keep the order of samples, which sample_time needs; add a column of the time")
     made = plan(model, by, parameters, Record(None, None, time, None, columns, hold, initial), given)
+    # Raises if one is missing.
     made.needed(list(frame.columns))
     if made.record.time is None and not has_times(frame._meta):
         raise Error('there is no column `t` or `time`, and no index of times; name the column by time="..."')

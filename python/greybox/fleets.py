@@ -130,6 +130,7 @@ class Plan:
         if isinstance(data, Path):
             raise Error(f"{data}: text files of many records are read by pandas: gb.fleet(model, pandas.read_csv({str(data)!r}), ...)")
         frame = Frame(data)
+        # Raises if one is missing.
         self.needed(frame.names)
         keys = [frame.values(name) for name in self.by]
         places, firsts = _groups(keys)

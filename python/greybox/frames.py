@@ -10,7 +10,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from greybox import _core
-from greybox.errors import Error, in_python
+from greybox.errors import Error, RecordWarning, in_python, warn
 from greybox.signals import near
 
 __all__ = ["Array", "Frame", "Kind", "has_times", "is_readonly", "place", "rename", "seconds", "time_column"]
@@ -19,6 +19,9 @@ Array: TypeAlias = "np.ndarray[Any, np.dtype[np.float64]]"
 
 #: Makes a frame of columns, of the kind that the caller handed over.
 Kind: TypeAlias = Callable[[Mapping[str, Any]], Any]
+
+#: Units of numbers that count from 1970.
+_SINCE_1970 = {1e-3: "milliseconds", 1e-6: "microseconds", 1e-9: "nanoseconds"}
 
 _TIMES = ("t", "time", "Time", "TIME", "timestamp", "Timestamp")
 
@@ -166,13 +169,16 @@ def time_column(names: Sequence[str], said: str | None = None) -> str | None:
 
 
 def _counted(stamps: Any, name: str) -> Any:
-    """Give times in seconds if they are numbers in the unit that the name of their column says, or since 1970."""
+    """Give numbers in seconds, from the unit that the name of their column says, or, so large, from one since 1970, with a warning."""
     if stamps.dtype.kind == "m":
         return stamps
     try:
         unit, origin = _core.Header([name]).seconds(0, float(stamps[0]) if len(stamps) else 0.0)
     except Error as error:
         raise Error(in_python(str(error))) from None
+    if origin != 0.0:
+        taken = f"the times in `{name}` are taken as {_SINCE_1970[unit]} since 1970 (the first is {origin:.15g})"
+        warn(RecordWarning(f"{taken}; if they are others, say their unit in the name, such as `{name} [ns]`"))
     return stamps if (unit, origin) == (1.0, 0.0) else (stamps - origin) * unit
 
 

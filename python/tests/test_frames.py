@@ -132,7 +132,11 @@ def test_a_time_is_in_the_unit_that_its_name_says(name: str, scale: float, said:
 def test_numbers_since_1970_are_recognized() -> None:
     c = cooled()
     stamps = (1_742_480_000_000 + (c["t"] * 1e3).round()).astype(np.int64)
-    assert abs(k_of({**c, "t": stamps}) / k_of(c) - 1) < 1e-9
+    with pytest.warns(gb.RecordWarning, match="`t` are taken as milliseconds since 1970 .*the first is 1742480000000.*say their unit"):
+        assert abs(k_of({**c, "t": stamps}) / k_of(c) - 1) < 1e-9
+    # The clock of a computer that runs for an hour, in nanoseconds.
+    frame = {"t [ns]": 3.6e12 + c["t"] * 1e9, "room": c["room"], "body": c["body"]}
+    assert abs(k_of(frame) / k_of(c) - 1) < 1e-9
 
 
 def test_columns_may_say_the_unit_of_their_signal() -> None:

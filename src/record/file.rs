@@ -78,7 +78,8 @@ use std::path::{Path, PathBuf};
 /// **Columns** go by name. Each input and output of the model has a column of its own name, with a unit behind it or without
 /// (`ud [V]`, `ud / V`), unless [`column`](DataFile::column) says another. States need none; further columns are ignored. A value is
 /// `factor * cell + offset`, in the unit of the signal. Where the file says a unit that is known and not the signal's (rpm for rad/s, mA for
-/// A; of a column that was said, also as `speed_rpm`), it is refused until a [`unit`](DataFile::unit) or a [`factor`](DataFile::factor) is given; nothing is converted unasked.
+/// A; of a column that was said, also as `speed_rpm`), it is refused until a [`unit`](DataFile::unit) or a [`factor`](DataFile::factor) is
+/// given; nothing is converted unasked.
 ///
 /// **Cells** stand between commas, semicolons, tabs, bars or runs of spaces, may be quoted, and may have white space around them. Letters
 /// are UTF-8, or else Windows-1252, of which Latin-1 is a part. Numbers

@@ -202,7 +202,7 @@ pub(super) fn over_unit(name: &str) -> Option<(&str, &str)> {
     (!before.is_empty() && is_unit(unit)).then_some((before, unit))
 }
 
-/// What may be a unit behind a name: `speed_rpm`, `current mA`. A single letter is mostly a place or a phase: `T_h`, `i_d`.
+/// What may be a unit behind a name: `speed_rpm`, `current mA`. A single letter is more often an index: `T_h`, `i_d`.
 pub(super) fn behind_name(name: &str) -> Option<&str> {
     let (_, unit) = name.rsplit_once(['_', ' '])?;
     (unit.chars().count() > 1).then_some(unit)

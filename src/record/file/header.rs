@@ -19,6 +19,7 @@ use crate::layout::Quantity;
 /// // Of a column that is said to be that of the time, any name may have a unit behind it.
 /// let header = Header::new("the frame", vec!["clock_ms".into()]);
 /// assert_eq!((header.time(None)?, header.time(Some("clock_ms"))?, header.seconds(0, 0.0)?), (None, Some(0), (1e-3, 0.0)));
+/// assert!(header.seconds(1, 0.0).unwrap_err().to_string().contains("no column in place 1 of 1"));
 /// # Ok::<(), greybox::Error>(())
 /// ```
 #[derive(Clone, Debug)]
@@ -34,7 +35,7 @@ impl Header {
         Header { file: DataFile::new(what), names }
     }
 
-    /// The place of the column of this name, or of this name with a unit, that holds a signal; `None` if there is none.
+    /// The place (from zero) of the column of this name, or of this name with a unit, that holds a signal; `None` if there is none.
     ///
     /// # Errors
     /// Several such columns; a unit that is known and not that of the signal.
@@ -47,8 +48,8 @@ impl Header {
         }
     }
 
-    /// The place of the column of the time: the one of the name that is said, with a unit or without, or else the one that a file would have its
-    /// time from; `None` if there is none.
+    /// The place (from zero) of the column of the time: the one of the name that is said, with a unit or without, or else the one in which the time
+    /// of a file is found (see [`DataFile`]); `None` if there is none.
     ///
     /// # Errors
     /// Several columns of that name.
@@ -60,12 +61,17 @@ impl Header {
         }
     }
 
-    /// How numbers in the column of the time, the first of them given, become seconds: `(number - origin) * unit`, as `(unit, origin)`.
+    /// How the numbers in the column in this place become seconds, `(number - origin) * unit`: the unit (s), as the name or the size of the first
+    /// number says, and the origin (a number of the column), zero unless they count from 1970.
     ///
     /// # Errors
-    /// A unit that is no unit of time that is known; dates that are written as numbers.
+    /// No column in this place; a unit that is no known unit of time; dates that are written as numbers.
     pub fn seconds(&self, time: usize, first: f64) -> Result<(f64, f64), Error> {
-        let file = self.timed(Some(&self.names[time]));
+        let Some(name) = self.names.get(time) else {
+            let columns = self.names.len();
+            return Err(self.file.cannot(format!("there is no column in place {time} of {columns} (from zero)")));
+        };
+        let file = self.timed(Some(name));
         Ok(file.ticks(&self.names, None, time, first)?.map_or((1.0, 0.0), |ticks| (ticks.unit, ticks.origin)))
     }
 

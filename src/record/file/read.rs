@@ -211,7 +211,7 @@ impl DataFile {
         let over = || over_unit(name).filter(|(name, _)| *name == said.name()).map(|(_, unit)| unit);
         let written = split_unit(name).1.or_else(over).filter(|_| *name != signal.name);
         let (mut factor, mut offset) = (said.factor.unwrap_or(1.0), said.offset);
-        // Letters behind an underscore may be a part of the name, and count only where the signal's unit is of another size.
+        // What stands behind an underscore or a space may be a part of the name: it is a unit only where it converts to the signal's.
         let behind = || {
             let other =
                 |unit: &&str| matches!(relation(unit, &signal.unit), Relation::Factor(_) | Relation::OtherZero { .. });
