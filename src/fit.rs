@@ -8,6 +8,7 @@ mod fleet;
 mod kink;
 mod lockstep;
 mod moves;
+mod nearby;
 mod pieces;
 mod predict;
 #[cfg(feature = "parallel")]

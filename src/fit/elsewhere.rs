@@ -156,7 +156,9 @@ impl Problem<'_> {
     ) -> Option<Summary> {
         let searched = self.searched(found, further, control);
         let searched = self.compared_with_simulation(searched.as_ref().unwrap_or(found), control).or(searched);
-        match self.may_be_local(searched.as_ref().unwrap_or(found), control) {
+        let local = self.may_be_local(searched.as_ref().unwrap_or(found), control);
+        let searched = self.searched_nearby(searched.as_ref().unwrap_or(found), control).or(searched);
+        match local {
             Some(note) => Some(noted(searched.unwrap_or_else(|| found.clone()), Some(note))),
             None => searched,
         }
