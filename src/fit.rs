@@ -5,6 +5,7 @@ mod by_name;
 mod elsewhere;
 mod fittable;
 mod fleet;
+mod further;
 mod kink;
 mod lockstep;
 mod moves;

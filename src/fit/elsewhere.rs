@@ -1,20 +1,19 @@
 //! Searches that a fit runs by itself after its estimate was judged, since another minimum may be the right one: on the other side of
 //! half the frequency of sampling, and from further starts and in stages where an output is left unexplained.
 
+use super::further::{Further, Reason, Way, with_work_of};
 use super::moves::{EXPLAINS, Moves};
 use super::refine::{Start, is_only_coarse, is_useless};
-use super::staged::noted;
-use super::stages::Led;
+use super::staged::{is_stuck, noted};
 use crate::estimate::{About, OutputEstimate, Summary, Warning, WarningCode};
-use crate::numeral::counted;
+use crate::optimize::Outcome;
 use crate::problem::{Control, Lead, Noise, Problem, SearchPlan, Settings};
 use crate::severity::Severity;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 /// Starts of a fit whose first search left an output unexplained, the declared one among them: of 138 records of predators
 /// and prey 16 starts led 118 to the right minimum, 24 led 133, 32 led 136.
-const STARTS: usize = 32;
-const UNEXPLAINED: &str = "the search ended where an output is left unexplained";
+pub(super) const STARTS: usize = 32;
 /// Most trial steps of a further search: so many, or so many times those of the search before, by where it begins.
 const LEAST_TRIALS: u64 = 100;
 const FROM_A_START: u64 = 1;
@@ -44,107 +43,6 @@ impl Trials {
     }
 }
 
-/// What further searches found.
-pub(super) enum Further {
-    Found {
-        best: Box<Summary>,
-        way: Way,
-        /// Whether limits of the fit stopped searches before their end.
-        stopped: bool,
-        time: Duration,
-    },
-    /// Records are longer than so many samples, with which searches from further starts would take too long, and stages lead nowhere.
-    TooLong(usize),
-}
-
-/// Where further searches began.
-pub(super) enum Way {
-    Starts,
-    /// At the end of stages.
-    Stages(Led),
-}
-
-impl Way {
-    /// Whether stages led to an estimate that explains all outputs. It is taken also where its search has not converged, as is common on the
-    /// rough cost of a chaotic plant.
-    fn explains(&self, best: &Summary) -> bool {
-        matches!(self, Way::Stages(_)) && !leaves_unexplained(best)
-    }
-}
-
-impl Further {
-    /// The best minimum, if it is usable, in place of the estimate before it.
-    pub fn usable(&self, before: &Summary) -> Option<Summary> {
-        match self {
-            Further::Found { best, .. } => (best.severity() < Severity::NotUsable).then(|| self.or(before)),
-            Further::TooLong(_) => None,
-        }
-    }
-
-    /// What led to where the searches began, if stages did.
-    pub fn led(&self) -> Option<&Led> {
-        match self {
-            Further::Found { way: Way::Stages(led), .. } => Some(led),
-            _ => None,
-        }
-    }
-
-    /// The better one of the best minimum and an estimate that has the work of these searches, with a note.
-    fn or(&self, found: &Summary) -> Summary {
-        let (mut best, text) = match self {
-            Further::Found { best, way, stopped, .. } => {
-                let began = match way {
-                    Way::Starts => format!("from {STARTS} starts by itself, and went on from the best of them"),
-                    Way::Stages(led) => format!("by itself from the end of {}", led.path()),
-                };
-                let stopped = if *stopped { "; limits of the fit stopped searches before their end" } else { "" };
-                let better = if way.explains(best) || is_better(best, found) {
-                    work_of(found, (**best).clone())
-                } else {
-                    found.clone()
-                };
-                (better, format!("{UNEXPLAINED}, so that the fit searched {began}{stopped}"))
-            }
-            Further::TooLong(most) => (
-                found.clone(),
-                format!(
-                    "{UNEXPLAINED}; with more than {} the fit does not search from further starts by itself, so ask for \
-                     Fit::starts({STARTS})",
-                    counted(*most as u64, "sample")
-                ),
-            ),
-        };
-        let colored = best.warnings.iter().any(|warning| warning.code == WarningCode::ColoredErrors);
-        let (severity, local) = match colored {
-            true => (
-                Severity::UsableWithCare,
-                "; the errors are colored, as those of a local minimum are: a lower one may lie elsewhere",
-            ),
-            false => (Severity::Usable, ""),
-        };
-        best.warnings.push(Warning::new(WarningCode::Unexplained, severity, text + local).about(About::Search));
-        best
-    }
-}
-
-/// An estimate as if it had taken the work of another.
-pub(super) fn work_of(of: &Summary, found: Summary) -> Summary {
-    Summary { iterations: of.iterations, evaluations: of.evaluations, seconds: of.seconds, ..found }
-}
-
-/// An estimate with the work of further searches after it.
-pub(super) fn with_work_of(found: Summary, further: Option<&Further>) -> Summary {
-    match further {
-        Some(Further::Found { best, time, .. }) => Summary {
-            iterations: found.iterations + best.iterations,
-            evaluations: found.evaluations + best.evaluations,
-            seconds: found.seconds + time.as_secs_f64(),
-            ..found
-        },
-        _ => found,
-    }
-}
-
 impl Problem<'_> {
     /// The estimate after further searches from other starts, with their time and evaluations; `None` if it needs none, or if the fit's
     /// limits of time and trial steps are used up. `further` is what searches from further starts found before, if there were any.
@@ -167,21 +65,12 @@ impl Problem<'_> {
     /// A note that the minimum may be a local one: a single search led to it from a start whose simulation is far off, and its errors are colored, as
     /// those of a local minimum are.
     fn may_be_local(&self, found: &Summary, control: &Control) -> Option<Warning> {
-        let colored =
-            |warning: &Warning| warning.code == WarningCode::ColoredErrors && warning.severity > Severity::Usable;
         let searched = |warning: &Warning| {
             warning.code == WarningCode::Staged
                 || warning.code == WarningCode::Unexplained && warning.about == About::Search
         };
-        let single = self.settings.searches == SearchPlan::Single && self.settings.lead == Lead::Declared;
-        if !single
-            || self.sweep.restarts().is_some()
-            || self.sweep.predicts_variance()
-            || self.layout().states.is_empty()
-            || !found.warnings.iter().any(colored)
-            || found.warnings.iter().any(searched)
-            || self.start_explains(control) != Some(false)
-        {
+        let is_noted = found.warnings.iter().any(searched) || !self.leads_to_color(found);
+        if is_noted || self.start_explains(control) != Some(false) {
             return None;
         }
         let text = "a simulation from the declared start is off by more than a quarter of an output's range (rms), and the errors where the search \
@@ -189,8 +78,32 @@ impl Problem<'_> {
         Some(Warning::new(WarningCode::Staged, Severity::Usable, text.to_owned()).about(About::Search))
     }
 
-    fn searched(&self, found: &Summary, further: Option<&Further>, control: &Control) -> Option<Summary> {
+    /// Whether a single simulated search from the declared start, as far as it was told, led to where errors are colored.
+    fn leads_to_color(&self, found: &Summary) -> bool {
+        let is_colored =
+            |warning: &Warning| warning.code == WarningCode::ColoredErrors && warning.severity > Severity::Usable;
+        self.settings.searches == SearchPlan::Single
+            && self.settings.lead == Lead::Declared
+            && self.sweep.restarts().is_none()
+            && !self.sweep.predicts_variance()
+            && !self.layout().states.is_empty()
+            && found.warnings.iter().any(is_colored)
+    }
+
+    /// Why an estimate is to be followed by further searches; `None` if it is not.
+    fn reason(&self, found: &Summary) -> Option<Reason> {
+        let by_itself = is_stuck(found.outcome) || matches!(found.outcome, Outcome::OwnLimit { .. });
         if leaves_unexplained(found) {
+            Some(Reason::Unexplained)
+        } else if by_itself && found.severity() == Severity::NotUsable && self.leads_to_color(found) {
+            Some(Reason::Stuck)
+        } else {
+            None
+        }
+    }
+
+    fn searched(&self, found: &Summary, further: Option<&Further>, control: &Control) -> Option<Summary> {
+        if self.reason(found).is_some() {
             return match further {
                 Some(further) => Some(further.or(found)),
                 None => {
@@ -208,7 +121,7 @@ impl Problem<'_> {
         Some(Summary { seconds: found.seconds + begin.elapsed().as_secs_f64(), ..best })
     }
 
-    /// Further searches where an estimate leaves an output unexplained: in stages, and from further starts where the minimum that the stages lead
+    /// Further searches where an estimate leaves an output unexplained, or where its search is stuck: in stages, and from further starts where the minimum that the stages lead
     /// to is not usable, nor its errors near the noise, unless records are long. They run by the default method; the best minimum goes on by finer ones
     /// where only the step is wrong with it. After stages that were asked for they are from further starts. `None` where a number of starts was asked
     /// for, where the measurements tell nothing by any parameters, and where the variance is predicted: that likelihood has no bound at noise levels
@@ -217,24 +130,24 @@ impl Problem<'_> {
         let untold = [WarningCode::ConstantOutput, WarningCode::TooFewMeasurements];
         let predicted = self.settings.noise == Noise::Predicted;
         if control.stops()
-            || !leaves_unexplained(found)
             || self.settings.searches != SearchPlan::Single
             || predicted
             || untold.into_iter().any(|code| is_useless(found, code))
         {
             return None;
         }
+        let reason = self.reason(found)?;
         let trials = Trials::of(FROM_A_START, found.iterations, self.settings.optimizer.most())?.most;
         let begin = Instant::now();
         let further = |(best, way): (Summary, Way)| {
             let (best, stopped, time) = (Box::new(best), control.stops(), begin.elapsed());
-            Further::Found { best, way, stopped, time }
+            Further::Found { reason, best, way, stopped, time }
         };
         let in_stages = || self.searched_in_stages(begin, control).map(|(best, led)| (best, Way::Stages(led)));
         let staged = if self.settings.lead == Lead::Declared { in_stages() } else { None };
         let most = if self.runs_in_lanes() { LONGEST_IN_LANES } else { LONGEST };
         if self.samples() > most {
-            return Some(staged.map_or(Further::TooLong(most), further));
+            return Some(staged.map_or(Further::TooLong(reason, most), further));
         }
         let is_usable = |best: &Summary| best.severity() < Severity::NotUsable;
         let suffices = |best: &Summary| is_usable(best) || !leaves_unexplained(best) && self.is_near_noise(best);
@@ -306,37 +219,11 @@ fn is_found(staged: &Summary, again: &Summary) -> bool {
     }
 }
 
-/// Whether further searches found a better estimate: one that explains all outputs, or one of no higher deviance. The first search had more
-/// trial steps than most of theirs, and may have ended lower.
-fn is_better(again: &Summary, found: &Summary) -> bool {
-    let lower = again.deviance.zip(found.deviance).is_some_and(|(again, found)| again <= found + SAME);
-    let converged = again.outcome.converged() || !found.outcome.converged();
-    converged && (lower || !leaves_unexplained(again))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::optimize::Outcome;
     use crate::tests::{Current, Gain, Line, Voltage};
     use crate::{Experiment, Fit, Model, Nothing, Scalar, Time, free, signals};
-
-    /// Neither a higher minimum nor a search that has not ended takes the place of a minimum, where no output is explained.
-    #[test]
-    fn a_higher_minimum_is_not_better() {
-        let inputs: Vec<Voltage> = (0..40).map(|k| Voltage { u: f64::from(k * 37 % 21) - 10.0 }).collect();
-        let outputs = (0..40).map(|k| Current { i: f64::from(k * 11 % 17) - 8.0 }).collect();
-        let record = Experiment::new(&Line, Time::Uniform { start: 0.0, step: 1.0 }, inputs, outputs).unwrap();
-        let fit = Fit::new(&Line, &record).parameters(Gain { a: free(1.0) }).starts(1);
-        let found = fit.run().unwrap().summary().clone();
-        assert!(leaves_unexplained(&found) && found.outcome.converged(), "{found:?}");
-        let of = |by: f64| Summary { deviance: found.deviance.map(|deviance| deviance + by), ..found.clone() };
-        assert_eq!([-1.0, 0.0, 1.0].map(|by| is_better(&of(by), &found)), [true, true, false]);
-        let unended = Summary { outcome: Outcome::IterationLimit { iterations: 9 }, ..of(-1.0) };
-        assert!(!is_better(&unended, &found) && is_better(&of(-1.0), &unended));
-        // A higher one that explains the output is better all the same: without its warnings it is usable.
-        assert!(is_better(&Summary { warnings: vec![], ..of(1.0) }, &found));
-    }
 
     /// Of two usable minima the lower one is taken; a usable one is taken before another, whatever their deviances.
     #[test]
@@ -354,23 +241,6 @@ mod tests {
         let unusable = |by: f64| Summary { warnings: vec![wrong.clone()], ..of(by) };
         assert!(is_found(&of(100.0), &unusable(0.0)) && !is_found(&unusable(-100.0), &found));
         assert!(!is_found(&unusable(-100.0), &unusable(0.0)));
-    }
-
-    /// What further searches found is with care where its errors are colored, and as usable as it was where they are not.
-    #[test]
-    fn colored_errors_after_further_searches_are_with_care() {
-        let inputs: Vec<Voltage> = (0..40).map(|k| Voltage { u: f64::from(k * 37 % 21) - 10.0 }).collect();
-        let noise = |k: usize| f64::from(k as u32 * 11 % 17) / 17.0 - 0.5;
-        let outputs = inputs.iter().enumerate().map(|(k, u)| Current { i: 2.0 * u.u + noise(k) }).collect();
-        let record = Experiment::new(&Line, Time::Uniform { start: 0.0, step: 1.0 }, inputs, outputs).unwrap();
-        let found = Fit::new(&Line, &record).parameters(Gain { a: free(1.0) }).run().unwrap().summary().clone();
-        let colored = Warning::new(WarningCode::ColoredErrors, Severity::Usable, String::new()).about(About::Output(0));
-        let severity = |warnings: Vec<Warning>| {
-            let best = Box::new(Summary { warnings, ..found.clone() });
-            let further = Further::Found { best, way: Way::Starts, stopped: false, time: Duration::ZERO };
-            further.or(&found).severity()
-        };
-        assert_eq!([severity(vec![]), severity(vec![colored])], [Severity::Usable, Severity::UsableWithCare]);
     }
 
     /// At least 100 steps, three times 50 or 60, as far as 200 leave them: 150 after 50, 140 after 60, none after 200.

@@ -1,6 +1,6 @@
 //! Fits of single records in lockstep: one evaluation of all of them is one pass over lanes.
 
-use super::elsewhere::{Further, with_work_of};
+use super::further::{Further, with_work_of};
 use super::refine::{Attempt, Start};
 use super::search::{Rounds, at_end, ended, settled};
 use super::staged::{after_stages, noted};

@@ -1,6 +1,7 @@
 //! Running a problem: search, estimate at a given point, objective, prediction, states.
 
-use super::elsewhere::{self, leaves_unexplained};
+use super::elsewhere::leaves_unexplained;
+use super::further;
 use super::predict::asked;
 use super::refine::{Attempt, Start, after, with_work_of};
 use super::search::{at_end, search, settled};
@@ -86,7 +87,7 @@ impl Problem<'_> {
         let explained = led.as_ref().is_some_and(Led::explains);
         let further = found.as_ref().ok().filter(|_| !explained);
         let further = further.and_then(|found| self.search_further(found, control));
-        let found = found.map(|found| elsewhere::with_work_of(found, further.as_ref()));
+        let found = found.map(|found| further::with_work_of(found, further.as_ref()));
         let found = match further.as_ref().zip(found.as_ref().ok()).and_then(|(further, found)| further.usable(found)) {
             Some(usable) => usable,
             None => self.or_in_stages(self.refined(found, 0, begin, control), control)?,

@@ -1,6 +1,7 @@
 //! Fits that go in stages: asked for, or because their start cannot be simulated or leads to no minimum.
 
-use super::elsewhere::{SAME, leaves_unexplained, work_of};
+use super::elsewhere::{SAME, leaves_unexplained};
+use super::further::work_of;
 use super::refine::{Start, is_only_coarse};
 use super::stages::Led;
 use crate::error::Error;
@@ -112,7 +113,7 @@ impl Problem<'_> {
 }
 
 /// Whether a search ended by itself and not at a minimum: no limit ended it.
-fn is_stuck(outcome: Outcome) -> bool {
+pub(super) fn is_stuck(outcome: Outcome) -> bool {
     let stuck = matches!(
         outcome,
         Outcome::Stalled { .. } | Outcome::Creeping { .. } | Outcome::Rough { .. } | Outcome::LimitOfPrecision { .. }
