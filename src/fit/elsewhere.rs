@@ -1,7 +1,7 @@
 //! Searches that a fit runs by itself after its estimate was judged, since another minimum may be the right one: on the other side of
 //! half the frequency of sampling, and from further starts and in stages where an output is left unexplained.
 
-use super::further::{Further, Reason, Way, with_work_of};
+use super::further::{Further, Reason, SAME, STARTS, Way, leaves_unexplained, with_work_of};
 use super::moves::{EXPLAINS, Moves};
 use super::refine::{Start, is_only_coarse, is_useless};
 use super::staged::{is_stuck, noted};
@@ -11,9 +11,6 @@ use crate::problem::{Control, Lead, Noise, Problem, SearchPlan, Settings};
 use crate::severity::Severity;
 use std::time::Instant;
 
-/// Starts of a fit whose first search left an output unexplained, the declared one among them: of 138 records of predators
-/// and prey 16 starts led 118 to the right minimum, 24 led 133, 32 led 136.
-pub(super) const STARTS: usize = 32;
 /// Most trial steps of a further search: so many, or so many times those of the search before, by where it begins.
 const LEAST_TRIALS: u64 = 100;
 const FROM_A_START: u64 = 1;
@@ -23,9 +20,6 @@ const FROM_THE_OTHER_SIDE: u64 = 3;
 /// that run in vector registers, and of others.
 const LONGEST_IN_LANES: usize = 20_000;
 const LONGEST: usize = 2_000;
-
-/// Deviances that differ by less belong to one minimum: a move by a tenth of a standard error changes the deviance by 0.1^2.
-pub(super) const SAME: f64 = 0.01;
 
 /// The most trial steps of each further search, at least one, and whether the user's limit makes them fewer.
 #[derive(Clone, Copy)]
@@ -150,7 +144,10 @@ impl Problem<'_> {
             return Some(staged.map_or(Further::TooLong(reason, most), further));
         }
         let is_usable = |best: &Summary| best.severity() < Severity::NotUsable;
-        let suffices = |best: &Summary| is_usable(best) || !leaves_unexplained(best) && self.is_near_noise(best);
+        // An end that explains more than the first one may be stuck as that was.
+        let is_new = |best: &Summary| matches!(reason, Reason::Unexplained) || best.outcome.converged();
+        let suffices =
+            |best: &Summary| is_usable(best) || is_new(best) && !leaves_unexplained(best) && self.is_near_noise(best);
         // Pieces that are explained have the right parameters, though no simulation follows the record.
         let are_led =
             |(best, way): &(Summary, Way)| suffices(best) || matches!(way, Way::Stages(led) if led.explains());
@@ -195,14 +192,6 @@ impl Problem<'_> {
     pub(super) fn runs_in_lanes(&self) -> bool {
         self.records.first().is_some_and(|first| self.sweep.lanes(first, self.unknowns.seeds(0)) > 1)
     }
-}
-
-/// Whether an estimate is not usable and leaves an output unexplained. That may not be the reason by itself: where the loss is robust
-/// or measurements are weighted, it is a warning only.
-pub(super) fn leaves_unexplained(found: &Summary) -> bool {
-    let of_an_output = |warning: &Warning| matches!(warning.about, About::Output(_));
-    let unexplained = |warning: &Warning| warning.code == WarningCode::Unexplained && of_an_output(warning);
-    found.severity() == Severity::NotUsable && found.warnings.iter().any(unexplained)
 }
 
 /// Whether the estimate from the end of stages replaces that of further starts. Of two usable ones, the lower one is taken, and a usable one before

@@ -1,6 +1,6 @@
 //! Estimates where multiple shooting follows the measurements and one simulation of a whole record does not.
 
-use super::elsewhere::leaves_unexplained;
+use super::further::leaves_unexplained;
 use super::refine::{Start, is_only_coarse};
 use super::shooting::Shot;
 use super::staged::note;

@@ -1,7 +1,6 @@
 //! Running a problem: search, estimate at a given point, objective, prediction, states.
 
-use super::elsewhere::leaves_unexplained;
-use super::further;
+use super::further::{self, leaves_unexplained};
 use super::predict::asked;
 use super::refine::{Attempt, Start, after, with_work_of};
 use super::search::{at_end, search, settled};

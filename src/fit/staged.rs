@@ -1,7 +1,6 @@
 //! Fits that go in stages: asked for, or because their start cannot be simulated or leads to no minimum.
 
-use super::elsewhere::{SAME, leaves_unexplained};
-use super::further::work_of;
+use super::further::{SAME, leaves_unexplained, work_of};
 use super::refine::{Start, is_only_coarse};
 use super::stages::Led;
 use crate::error::Error;

@@ -232,10 +232,10 @@ fn the_emps_record_is_fitted_in_open_loop_from_far() {
         offset: free(-19.631574),
     };
     let fit = Fit::new(&model, &record).parameters(start).run().unwrap();
-    // One of the two best minima, 2.451 and 2.474 mm rms.
+    // The better one of two minima, 2.451 and 2.474 mm rms.
     let rms = (2.0 * fit.cost / 24_841.0).sqrt();
     assert!(
-        fit.outcome.converged() && fit.iterations < 300 && rms < 2.5e-3,
+        fit.outcome.converged() && fit.iterations < 700 && (rms - 2.4511e-3).abs() < 1e-7,
         "{rms}: {} {}",
         fit.iterations,
         fit.outcome
