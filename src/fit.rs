@@ -211,9 +211,14 @@ impl<'a, M: Made> Fit<'a, M> {
     /// found.
     ///
     /// Unless set, a fit searches from the declared start. If it is not usable and the model leaves one of the
-    /// outputs unexplained ([`WarningCode::Unexplained`](crate::WarningCode::Unexplained)), it goes on by itself: in stages ([`staged`](Fit::staged)), and,
+    /// outputs unexplained ([`WarningCode::Unexplained`](crate::WarningCode::Unexplained)), or if the search is stuck at no minimum and the errors are
+    /// colored, it goes on by itself: in stages ([`staged`](Fit::staged)), and,
     /// where these lead to nothing usable, nor to errors near the noise, from 32 starts, after 150 evaluations of each from the best four only. It says so; with
     /// `starts(1)` it does not, and with more than 20,000 samples (2,000 where the model does not run in vector registers) in stages only.
+    ///
+    /// Where errors are colored and the cost does not rise from the minimum as its slopes say
+    /// ([`WarningCode::CurvedInterval`](crate::WarningCode::CurvedInterval)), minima may lie side by side, as with dry friction. Eight searches from places a few
+    /// standard errors away follow then, with one start or several, up to 100,000 samples (5,000), and the lowest minimum is taken.
     ///
     /// The first start is the declared one. Half of the others are a Latin hypercube (McKay, Beckman and Conover, Technometrics 21
     /// (1979) 239), the same in every run. The rest are the best by their costs of 40 times as many places, half of which lie up to a factor of 100 off
@@ -255,7 +260,7 @@ impl<'a, M: Made> Fit<'a, M> {
     /// many minima.
     ///
     /// A fit goes in stages without being asked where the declared start cannot be simulated by any of its methods. It does so, too, where its search
-    /// leaves an output unexplained: it searches from further starts after that only if the minimum that the stages lead to is not usable, with errors
+    /// leaves an output unexplained or is stuck with colored errors: it searches from further starts after that only if the minimum that the stages lead to is not usable, with errors
     /// above 1.5 times the noise, and records are not long. After `starts(1)` it does neither. A fit that was asked for stages searches from no further
     /// starts by itself.
     ///

@@ -31,6 +31,7 @@ impl Problem<'_> {
         let is_warned =
             |code| found.warnings.iter().any(|warning| warning.code == code && warning.severity > Severity::Usable);
         if !(is_warned(WarningCode::ColoredErrors) && is_warned(WarningCode::CurvedInterval))
+            || self.settings.searches == SearchPlan::All(1)
             || !found.outcome.converged()
             || self.sweep.predicts_variance()
             || self.samples() > longest
