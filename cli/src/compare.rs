@@ -71,6 +71,9 @@ pub fn run(one: &Compare, terminal: &Terminal) -> Result<Verdict, Failure> {
     }
     output::check(one.report.as_deref(), &output::REPORTS)?;
     let (files, validation) = (expanded(&one.records)?, expanded(&one.validation)?);
+    let models =
+        one.models.iter().map(|name| parts(name)).flat_map(|(name, stored)| stored.into_iter().chain([name.into()]));
+    output::apart([&one.report], files.iter().chain(&validation).cloned().chain(models))?;
     let of_name = |name: &String| entrant(name, one, (&files, &validation), terminal);
     let entrants = one.models.iter().map(of_name).collect::<Result<Vec<_>, _>>()?;
     let Some(first) = entrants.first() else { return Err("no model is named: --model MODEL".into()) };
@@ -106,6 +109,14 @@ pub fn run(one: &Compare, terminal: &Terminal) -> Result<Verdict, Failure> {
     Ok(best.map_or(Verdict::NotUsable, Verdict::from))
 }
 
+/// A model and, after a colon, its estimate.
+fn parts(name: &str) -> (&str, Option<PathBuf>) {
+    match name.rsplit_once(':') {
+        Some((name, stored)) if stored.ends_with(".json") => (name, Some(PathBuf::from(stored))),
+        _ => (name, None),
+    }
+}
+
 /// Reads a model, with its estimate or fitted.
 fn entrant(
     name: &str,
@@ -113,10 +124,7 @@ fn entrant(
     (files, validation): (&[PathBuf], &[PathBuf]),
     terminal: &Terminal,
 ) -> Result<Entrant, Failure> {
-    let (name, stored) = match name.rsplit_once(':') {
-        Some((name, stored)) if stored.ends_with(".json") => (name, Some(PathBuf::from(stored))),
-        _ => (name, None),
-    };
+    let (name, stored) = parts(name);
     let model = model(Some(name), &one.of_model.values.constant, terminal)?;
     let parameters = declared(&model, &one.of_model)?;
     let records = records::all(files, &model, &one.of_records, &one.of_model.values.initial, terminal)?;

@@ -11,6 +11,7 @@ pub fn run(one: &Convert, terminal: &Terminal) -> Result<Verdict, Failure> {
     output::check(one.out.as_deref(), &output::RECORDS)?;
     let model = model(one.model.as_deref(), &[], terminal)?;
     let path = only(&one.records, "record")?;
+    output::apart([&one.out], one.model.iter().map(PathBuf::from).chain([path.clone()]))?;
     let record = records::one(&path, &model, &one.of_records, &[], terminal)?;
     write(&record, one.out.as_deref())?;
     Ok(Verdict::Usable)

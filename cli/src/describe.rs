@@ -1,7 +1,7 @@
 //! A fit or a stored estimate, from which commands that examine it go on.
 
 use crate::arguments::Refit;
-use crate::fitting::{Loaded, estimate, load, watched};
+use crate::fitting::{Loaded, estimate, load, read, watched};
 use crate::terminal::Terminal;
 use crate::{Failure, Verdict, fit, output};
 use greybox::problem::Problem;
@@ -22,6 +22,7 @@ pub struct Examined {
 /// Fits, or takes the estimate that is named.
 pub fn examined(refit: &Refit, terminal: &Terminal) -> Result<Examined, Failure> {
     output::check(refit.report.as_deref(), &output::REPORTS)?;
+    output::apart([&refit.report], read(&refit.fitting)?.into_iter().chain(refit.estimate.clone()))?;
     let loaded = load(&refit.fitting, terminal)?;
     let counter = Arc::new(AtomicU64::new(0));
     let problem = watched(&loaded, &refit.fitting.of_fit, terminal)?.counter(counter.clone()).problem()?;

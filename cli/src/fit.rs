@@ -1,7 +1,7 @@
 //! `fit`: parameters, with their intervals.
 
 use crate::arguments::Fit;
-use crate::fitting::{Loaded, load, watched};
+use crate::fitting::{Loaded, load, read, watched};
 use crate::terminal::Terminal;
 use crate::{Failure, Verdict, output};
 use greybox::diagnose::{Derived, derived_by};
@@ -14,6 +14,7 @@ pub fn run(one: &Fit, terminal: &Terminal) -> Result<Verdict, Failure> {
     output::check(one.json.as_deref(), &[])?;
     output::check(one.report.as_deref(), &output::REPORTS)?;
     output::check(one.plot.as_deref(), if cfg!(feature = "png") { &["svg", "png"] } else { &["svg"] })?;
+    output::apart([&one.json, &one.report, &one.plot, &one.fitting.of_fit.checkpoint], read(&one.fitting)?)?;
     let loaded = load(&one.fitting, terminal)?;
     let derived: Vec<_> = one
         .derived

@@ -21,6 +21,12 @@ pub struct Loaded {
     pub parameters: Vec<Parameter>,
 }
 
+/// The files that a fit reads.
+pub fn read(fitting: &Fitting) -> Result<Vec<PathBuf>, Failure> {
+    let of_model = fitting.model.iter().map(PathBuf::from).filter(|path| path.exists());
+    Ok(of_model.chain(expanded(&fitting.records)?).collect())
+}
+
 /// Reads the model and the records of a fit.
 pub fn load(fitting: &Fitting, terminal: &Terminal) -> Result<Loaded, Failure> {
     let model = model(fitting.model.as_deref(), &fitting.of_model.values.constant, terminal)?;
@@ -30,9 +36,7 @@ pub fn load(fitting: &Fitting, terminal: &Terminal) -> Result<Loaded, Failure> {
     }
     let records =
         records::all(&fitting.records, &model, &fitting.of_records, &fitting.of_model.values.initial, terminal)?;
-    let of_model = fitting.model.iter().map(PathBuf::from).filter(|path| path.exists());
-    let files = of_model.chain(expanded(&fitting.records)?).collect();
-    Ok(Loaded { model, files, records, parameters })
+    Ok(Loaded { model, files: read(fitting)?, records, parameters })
 }
 
 /// Reads a model file, or one that ships, with its constants.

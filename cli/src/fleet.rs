@@ -42,6 +42,12 @@ pub fn run(one: &Fleet, terminal: &Terminal) -> Result<Verdict, Failure> {
     if before > 0 {
         terminal.remark(format_args!("{before} records are in the table already"));
     }
+    if table.changed > 0 {
+        terminal.remark(format_args!(
+            "{} files were written after the rows of their records; these are fitted again",
+            table.changed
+        ));
+    }
     let bar = terminal.steps(paths.len(), "files");
     let reader = Reader {
         one,

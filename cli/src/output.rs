@@ -1,6 +1,7 @@
 //! Results: files that are whole or not there, and standard output.
 
 use crate::Failure;
+use crate::project::FILE;
 use crate::remedies::in_shell;
 use greybox::{Report, Summary};
 use std::io::Write;
@@ -32,8 +33,12 @@ pub fn write(path: Option<&Path>, content: &[u8]) -> Result<(), Failure> {
 
 /// Where a path leads: a link stays a link, and what it leads to is written.
 pub fn target(path: &Path) -> PathBuf {
-    // What is not there yet, and a pipe, have no other path.
-    path.canonicalize().unwrap_or_else(|_| path.to_owned())
+    // What is not there yet has no other path than that of its folder, and a pipe has none.
+    let in_folder = || {
+        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        Some(folder.canonicalize().ok()?.join(path.file_name()?))
+    };
+    path.canonicalize().ok().or_else(in_folder).unwrap_or_else(|| path.to_owned())
 }
 
 /// Writes a report as the path's ending says, one of [`REPORTS`].
@@ -62,6 +67,28 @@ pub fn check(path: Option<&Path>, endings: &[&str]) -> Result<(), Failure> {
         true => Ok(()),
         false => Err(format!("{}: there is no such folder, or a folder has this name", path.display()).into()),
     }
+}
+
+/// Checks before a fit that what a command writes takes the place neither of what it reads nor of another result.
+pub fn apart<'a>(
+    written: impl IntoIterator<Item = &'a Option<PathBuf>>,
+    read: impl IntoIterator<Item = PathBuf>,
+) -> Result<(), Failure> {
+    let read: Vec<PathBuf> = read.into_iter().chain([PathBuf::from(FILE)]).map(|path| target(&path)).collect();
+    let mut others: Vec<PathBuf> = vec![];
+    for path in written.into_iter().flatten() {
+        let at = target(path);
+        // To a pipe or a device any number of results may go.
+        let is_file = !at.exists() || at.is_file();
+        if is_file && read.contains(&at) {
+            return Err(format!("{}: this command reads it; name another file for the result", path.display()).into());
+        }
+        if is_file && others.contains(&at) {
+            return Err(format!("{}: two results would go there; name two files", path.display()).into());
+        }
+        others.push(at);
+    }
+    Ok(())
 }
 
 /// Prints. A reader that has seen enough, such as `head`, is no error.

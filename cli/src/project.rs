@@ -21,7 +21,7 @@ use subject::Subject;
 use toml::{Table, Value};
 
 /// The file's name, in the current folder.
-const FILE: &str = "greybox.toml";
+pub const FILE: &str = "greybox.toml";
 
 /// Why there are no arguments.
 pub enum Refused {

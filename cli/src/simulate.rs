@@ -7,12 +7,15 @@ use crate::{Failure, Verdict, convert, output, records};
 use greybox::layout::Layout;
 use greybox::record::Record;
 use greybox::{Fleet, fixed};
+use std::path::PathBuf;
 
 pub fn run(one: &Simulate, terminal: &Terminal) -> Result<Verdict, Failure> {
     output::check(one.out.as_deref(), &output::RECORDS)?;
     let model = model(one.model.as_deref(), &one.of_model.constant, terminal)?;
     let layout = model.equations().layout();
     let path = convert::only(&one.records, "file with the inputs")?;
+    let read = one.model.iter().map(PathBuf::from).chain([path.clone()]).chain(one.estimate.clone());
+    output::apart([&one.out], read)?;
     let stored = one.estimate.as_deref().map(estimate).transpose()?;
     // A record of the fit begins as the fit found it, for which outputs need not be in the file.
     let name = path.file_stem().unwrap_or_default().to_string_lossy();

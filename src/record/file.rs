@@ -110,8 +110,8 @@ use std::path::{Path, PathBuf};
 /// where the dates have a zone, or [`zone`](DataFile::zone) names theirs; without one, such a step is an error.
 ///
 /// If time is even, up to a millionth of a step (see [`Time::from_stamps`](crate::Time::from_stamps)), it is
-/// stored as [`Time::Uniform`](crate::Time::Uniform) and costs no memory. A static model needs no time: without a column `t`
-/// the rows are numbered.
+/// stored as [`Time::Uniform`](crate::Time::Uniform) and costs no memory. A static model needs no time: without such a
+/// column the rows are numbered.
 ///
 /// **The record** is named after the file, its input is held from sample to sample, and its initial state is estimated,
 /// unless the [`Experiment`](crate::Experiment) is told otherwise.

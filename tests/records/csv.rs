@@ -166,6 +166,18 @@ fn a_static_model_needs_no_time() {
     assert_eq!([record.time(0), record.time(1)], [0.0, 1.0]);
     let timed = Experiment::from_file(&Line, file("static_t.csv", "x,t,y\n7,3,8\n")).unwrap();
     assert_eq!(timed.time(0), 3.0);
+    for (name, header, rows) in [
+        ("static_time.csv", "Time,x,y", "60,7,8\n120,9,10\n"),
+        ("static_ms.csv", "time_ms,x,y", "60000,7,8\n120000,9,10\n"),
+        ("static_date.csv", "Date,x,y", "2025-03-20 14:05,7,8\n2025-03-20 14:06,9,10\n"),
+    ] {
+        let record = Experiment::from_file(&Line, file(name, &format!("{header}\n{rows}"))).unwrap();
+        assert_eq!(record.time(1) - record.time(0), 60.0, "{header}");
+    }
+    // Neither the column of a signal nor a temperature is a time.
+    let signal = DataFile::new(file("static_signal.csv", "time,y\n60,8\n70,10\n")).column("x", "time");
+    let beside = DataFile::new(file("static_beside.csv", "x,T,y\n60,8,9\n70,10,11\n"));
+    assert_eq!([signal, beside].map(|named| named.read(&Line).unwrap().time(1)), [1.0, 1.0]);
     // A time that was asked for must be there.
     let absent = DataFile::new(file("static_absent.csv", "x,y\n7,8\n")).column("t", "clock").read(&Line);
     assert!(absent.unwrap_err().to_string().contains("no column `clock` for `t`"));

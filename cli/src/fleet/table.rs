@@ -5,8 +5,9 @@ use super::journal::Journal;
 use super::row::{Header, Row};
 use crate::terminal::Terminal;
 use crate::{Failure, Verdict, output};
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
+use std::time::SystemTime;
 
 /// The end of the name of the file beside a table that says by which model and options it was made.
 const RUN: &str = ".run";
@@ -21,6 +22,15 @@ pub struct Table {
     journal: Option<Journal>,
     /// By which model and options the rows are made.
     made_by: String,
+    /// How many files were written after the rows of their records, which are not in the table any more.
+    pub changed: usize,
+}
+
+/// Whether a file was written after this; a pipe never was.
+fn is_newer(path: &str, than: Option<SystemTime>) -> bool {
+    let file = std::fs::metadata(path).ok().filter(|file| file.is_file());
+    let written = file.and_then(|file| file.modified().ok());
+    written.zip(than).is_some_and(|(written, than)| written > than)
 }
 
 impl Table {
@@ -31,7 +41,7 @@ impl Table {
     /// A file that is something else, is of another model or other options, or cannot be written.
     pub fn open(path: Option<&Path>, header: Header, made_by: String) -> Result<Self, Failure> {
         let (path_of, rows, failed) = (path.map(Path::to_owned), vec![], vec![]);
-        let mut table = Table { header, rows, failed, path: path_of, journal: None, made_by };
+        let mut table = Table { header, rows, failed, path: path_of, journal: None, made_by, changed: 0 };
         let Some(path) = path else { return Ok(table) };
         output::check(Some(path), &[])?;
         if path.exists() && !path.is_file() {
@@ -54,13 +64,34 @@ impl Table {
             false => vec![],
         };
         let written = table.own(path, written)?;
-        let (journal, unfinished) = Journal::open(&beside(path, ".journal"), &table.header.names, &table.made_by)?;
+        let journal = beside(path, ".journal");
+        let since = [path, &journal].map(|path| std::fs::metadata(path).ok());
+        // Rows are added to a journal one by one; what was written after the first may have been read before.
+        let [written_at, begun_at] = [
+            since[0].as_ref().and_then(|file| file.modified().ok()),
+            since[1].as_ref().and_then(|file| file.created().or_else(|_| file.modified()).ok()),
+        ];
+        let (journal, unfinished) = Journal::open(&journal, &table.header.names, &table.made_by)?;
         table.journal = Some(journal);
-        // A run that was killed between writing the table and removing its journal has the rows twice; an error may have become an answer.
-        let (failed, rows): (Vec<Row>, Vec<Row>) = written.into_iter().chain(unfinished).partition(Row::is_failed);
-        let mut there = HashSet::new();
-        table.rows = rows.into_iter().filter(|row| there.insert(row.name.clone())).collect();
-        table.failed = failed.into_iter().filter(|row| there.insert(row.name.clone())).collect();
+        let (mut changed, mut latest) = (HashSet::new(), HashMap::new());
+        let dated =
+            written.into_iter().map(|row| (row, written_at)).chain(unfinished.into_iter().map(|row| (row, begun_at)));
+        // A run that was killed between writing the table and removing its journal has the rows twice; an error may have become an answer, and a
+        // changed file has another row.
+        let mut rows: Vec<Option<Row>> = vec![];
+        for (row, at) in dated {
+            if is_newer(&row.name.record, at) {
+                changed.insert(row.name.record);
+                continue;
+            }
+            changed.remove(&row.name.record);
+            if let Some(before) = latest.insert(row.name.clone(), rows.len()) {
+                rows[before] = None;
+            }
+            rows.push(Some(row));
+        }
+        table.changed = changed.len();
+        (table.failed, table.rows) = rows.into_iter().flatten().partition(Row::is_failed);
         Ok(table)
     }
 

@@ -32,6 +32,36 @@ fn fit_prints_the_estimate_and_writes_what_is_asked_for() {
     assert_eq!(error, "");
 }
 
+/// No result takes the place of what the command reads, nor of another result, also by another path to the same file.
+#[test]
+fn results_take_no_place_of_what_is_read() {
+    let bench = Bench::new();
+    bench.ends(0, &["fit", "pmsm.toml", "record.csv", "--json", "e.json"]);
+    let kept = ["pmsm.toml", "record.csv", "e.json"].map(|name| std::fs::read(bench.path(name)).unwrap());
+    let fit = ["fit", "pmsm.toml", "record.csv"];
+    let values = ["--set", "rs=1", "--set", "ls=1e-3", "--set", "ke=1"];
+    let cases: [(&[&str], &[&str]); 8] = [
+        (&fit, &["--json", "pmsm.toml"]),
+        (&fit, &["--json", "./record.csv"]),
+        (&fit, &["--json", "new.json", "--report", "new.json"]),
+        (&["convert", "pmsm.toml", "record.csv"], &["--every", "10", "-o", "record.csv"]),
+        (&["simulate", "pmsm.toml", "record.csv", "-o", "record.csv"], &values),
+        (&["export", "pmsm.toml"], &["-o", "pmsm.toml"]),
+        (&["residuals", "pmsm.toml", "record.csv", "--estimate", "e.json"], &["--report", "e.json"]),
+        (&["compare", "--model", "pmsm.toml:e.json", "record.csv"], &["--report", "e.json"]),
+    ];
+    for (words, more) in cases {
+        let words = [words, more].concat();
+        let (_, error) = bench.ends(1, &words);
+        assert!(
+            error.contains("this command reads it") || error.contains("two results would go there"),
+            "{words:?} {error}"
+        );
+    }
+    assert_eq!(["pmsm.toml", "record.csv", "e.json"].map(|name| std::fs::read(bench.path(name)).unwrap()), kept);
+    assert_eq!(bench.names(), ["e.json", "pmsm.toml", "record.csv"]);
+}
+
 /// But for what depends on the processor and its load: the search's last step, its iterations and its time.
 #[test]
 fn the_readme_shows_what_is_printed() {

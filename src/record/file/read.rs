@@ -5,7 +5,7 @@ use super::columns;
 use super::guess::{behind_name, over_unit, split_unit};
 use super::numbers::Numbers;
 use super::table::Table;
-use super::timing::Timing;
+use super::timing::{Timing, tells_time};
 use super::{Column, DataFile, FileFormat, Reading, TimeSource};
 use crate::error::Error;
 use crate::interval::Hold;
@@ -93,11 +93,16 @@ impl DataFile {
         names: &[String],
         below: impl Fn(usize) -> Option<&'b str>,
     ) -> Result<Plan<'a>, Error> {
-        // A static model needs no time: without one its rows are numbered.
-        let timed = self.columns.iter().any(|column| column.signal == "t") || names.iter().any(|name| name == "t");
-        let step = self.sample_time.or((layout.kind == Kind::Static && !timed).then_some(1.0));
-        let time = if step.is_none() { Some(self.time_column(names)?) } else { None };
         let signals: Vec<&Quantity> = layout.inputs.iter().chain(&layout.outputs).collect();
+        // A static model needs no time: without a column that tells it, beside those of the signals, its rows are numbered.
+        let others = || {
+            let taken: Vec<usize> = signals.iter().filter_map(|signal| self.place(names, &signal.name).ok()).collect();
+            names.iter().enumerate().filter(move |(at, _)| !taken.contains(at)).map(|(_, name)| name)
+        };
+        let said = self.columns.iter().any(|column| column.signal == "t");
+        let untimed = layout.kind == Kind::Static && !said && !others().any(|name| tells_time(name));
+        let step = self.sample_time.or(untimed.then_some(1.0));
+        let time = if step.is_none() { Some(self.time_column(names)?) } else { None };
         let mut units = Vec::new();
         let sources = signals.iter().map(|signal| self.source(names, &below, signal, &mut units));
         let sources = sources.collect::<Result<Vec<_>, _>>()?;

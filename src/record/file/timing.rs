@@ -62,6 +62,17 @@ fn over_time(name: &str) -> Option<(&str, &str)> {
     over_unit(name).filter(|(_, unit)| time_unit(unit).is_some())
 }
 
+/// Whether a column of this name may be that of the time.
+pub(super) fn tells_time(name: &str) -> bool {
+    let is_known = |name: &str| {
+        let plain = plain(name);
+        name == "t" || NAMES.contains(&plain.as_str()) || DATES.contains(&plain.as_str())
+    };
+    is_known(split_unit(name).0)
+        || over_time(name).is_some_and(|(name, _)| is_known(name))
+        || suffix(name, false).is_some()
+}
+
 /// Whether a number is a date and a time of day, digit by digit: 20250320140500, without seconds or with milliseconds. As milliseconds or microseconds
 /// since 1970 these would be years to come, or of twelve digits the 1970s.
 fn is_compact(number: f64) -> bool {
