@@ -274,6 +274,20 @@ fn coarse_outputs_are_said() {
     assert_eq!((of(15), of(40)), (None, Some(Severity::UsableWithCare)));
 }
 
+/// Eleven values are coarse where the errors are those of rounding alone, 0.29 of a step, not where noise of half a step spreads them evenly; 41 values are
+/// not.
+#[test]
+fn rounding_without_noise_is_said() {
+    let of = |samples: usize, noise: f64, step: f64| {
+        let rounded = |y: Pair| Pair { y: (y.y / step).round() * step, ..y };
+        let rounded = edited(&record(samples, (2.0, 2.0), noise, moving), |_, y| rounded(y));
+        let values: std::collections::BTreeSet<i64> = rounded.outputs().map(|y| (y.y / step).round() as i64).collect();
+        (values.len(), severity(&fit(&[rounded]).run().unwrap(), WarningCode::CoarseOutput))
+    };
+    assert_eq!([of(400, 1e-3, 0.4), of(400, 1e-3, 0.1)], [(11, Some(Severity::UsableWithCare)), (41, None)]);
+    assert_eq!(of(400, 0.2, 0.4).1, None);
+}
+
 /// The deviance is that of the measurements: `sum of ln(2 pi s^2) + e^2 / s^2`, without what a prior adds to the cost.
 #[test]
 fn a_prior_is_no_part_of_the_deviance() {

@@ -61,13 +61,21 @@ fn starts(evidence: &Evidence<'_>) -> Vec<Warning> {
     let asked = matches!(evidence.point.objective.problem.settings.searches, SearchPlan::All(_));
     let unknowns = &evidence.point.objective.problem.unknowns;
     let has_signs = |minimum: &Minimum| unknowns.have_declared_signs(minimum.unknowns.iter().map(|(_, value)| *value));
-    let of = |starts| warnings(starts, evidence.residuals.measured, asked, evidence.color_dominates(), &has_signs);
+    let of_step = |minimum: &Minimum| {
+        let values = minimum.unknowns.iter().map(|(_, value)| *value);
+        let at: Vec<f64> = values.zip(&unknowns.row).map(|(x, row)| row.parameter.transform.to_coordinate(x)).collect();
+        evidence.point.objective.step_decides(&at) != Some(false)
+    };
+    let of = |starts| {
+        warnings(starts, evidence.residuals.measured, asked, evidence.color_dominates(), (&has_signs, &of_step))
+    };
     evidence.point.end.starts.as_ref().map_or(vec![], of)
 }
 
 /// Warnings about an estimate that is the best end of these searches, with errors that are colored or not. Where searches were not asked
 /// for, a minimum that is found once lowers the verdict no more than one that is found without other searches does. But one that is found
 /// once by many searches and leaves colored errors is seldom the right one: what is colored there is what the model does not explain.
+/// A minimum of the same cost where a finer step changes it, as at the edge of an integrator's stability, is no rival.
 /// A mirror image of the estimate that does not have the declared signs, where the estimate has them, is no rival; another minimum is, since a
 /// value just below zero may be a small positive one.
 fn warnings(
@@ -75,7 +83,7 @@ fn warnings(
     measurements: u64,
     asked: bool,
     colored: bool,
-    has_signs: &dyn Fn(&Minimum) -> bool,
+    (has_signs, of_step): (&dyn Fn(&Minimum) -> bool, &dyn Fn(&Minimum) -> bool),
 ) -> Vec<Warning> {
     let Starts { tried, agreed, minima, declared, failed, .. } = starts;
     let mut warnings = vec![];
@@ -99,13 +107,22 @@ fn warnings(
     let rival = |minimum: &&Minimum| measurements as f64 * minimum.cost_ratio.ln() < INDISTINGUISHABLE;
     let signed = minima.first().is_some_and(has_signs);
     let mirrored = |minimum: &Minimum| signed && minimum.cost_ratio <= MIRRORED && !has_signs(minimum);
-    if let Some(rival) = minima.iter().skip(1).filter(|one| !mirrored(one)).find(rival).filter(|_| *agreed > 0) {
+    let rivals = minima.iter().skip(1).filter(|one| !mirrored(one)).filter(rival).filter(|_| *agreed > 0);
+    let (of_step, rivals): (Vec<&Minimum>, Vec<&Minimum>) = rivals.partition(|one| of_step(one));
+    if let Some(rival) = rivals.first() {
         let text = format!(
             "another minimum explains the data as well, with {}, at {}: bounds or a prior must tell which one is meant",
             times_the_cost(rival.cost_ratio),
             at(rival)
         );
         warnings.push(with_care(WarningCode::RivalMinimum, text).about(About::Minimum));
+    } else if let Some(rival) = of_step.first() {
+        let text = format!(
+            "another minimum, with {}, at {}, is one of the integrator's step: a finer one changes its cost",
+            times_the_cost(rival.cost_ratio),
+            at(rival)
+        );
+        warnings.push(note(WarningCode::RivalMinimum, text).about(About::Minimum));
     }
     if let Some(declared) = declared.filter(|declared| *declared > 0).and_then(|declared| minima.get(declared)) {
         let text = format!(
@@ -198,7 +215,7 @@ mod tests {
         let minima = vec![minimum(1.0), minimum(rival)];
         let starts = Starts { tried, agreed, minima, declared: Some(declared), failed: vec![], evaluations: 1 };
         let has_signs = |minimum: &Minimum| minimum.cost_ratio == 1.0;
-        warnings(&starts, 100, true, false, &has_signs).iter().map(|warning| warning.code).collect()
+        warnings(&starts, 100, true, false, (&has_signs, &|_| false)).iter().map(|warning| warning.code).collect()
     }
 
     /// A deviance of `100 ln(ratio)` above 10 is another: at a ratio of 1.1052. A minimum found by one of several searches, and
@@ -224,7 +241,7 @@ mod tests {
             let minimum = Minimum { cost_ratio: 1.0, searches: agreed, undetermined: vec![], unknowns: vec![] };
             let starts =
                 Starts { tried, agreed, minima: vec![minimum], declared: None, failed: vec![], evaluations: 1 };
-            warnings(&starts, 100, asked, colored, &|_| true)
+            warnings(&starts, 100, asked, colored, (&|_| true, &|_| false))
         };
         let text = &said(8, 1, true, false)[0].text;
         assert!(

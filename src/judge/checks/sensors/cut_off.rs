@@ -3,7 +3,7 @@
 //! Truncation puts an offset of half a quantization step, on average, into an output, of which the unknowns take a part. The fit with that
 //! offset is compared with the fit without it, by the slopes at the estimate.
 
-use crate::judge::checks::data::{FEW, PART_OF_STEP, TIMES, distinct};
+use crate::judge::checks::data::{PART_OF_STEP, TIMES, distinct, steps};
 use crate::judge::checks::*;
 use crate::judge::evidence::extended::Extended;
 use crate::optimize::Linearization;
@@ -59,14 +59,6 @@ fn if_cut_off(extended: &Extended<'_>, unknowns: &[Unknown], (j, count, size): (
         number(errors, 2)
     );
     Some(with_care(WarningCode::CoarseOutput, text).about(About::Output(j)))
-}
-
-/// The number of values and the quantization step, where there are more than [`FEW`], all multiples of one step apart.
-fn steps(values: &[f64]) -> Option<(usize, f64)> {
-    let apart = || values.windows(2).map(|pair| pair[1] - pair[0]);
-    let step = apart().reduce(f64::min)?;
-    let multiple = |apart: f64| (apart / step - (apart / step).round()).abs() < 1e-6;
-    (values.len() > FEW && apart().all(multiple)).then_some((values.len(), step))
 }
 
 #[cfg(test)]
