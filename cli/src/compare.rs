@@ -17,6 +17,8 @@ struct Entrant {
     loaded: Loaded,
     problem: Problem<'static>,
     estimate: Summary,
+    /// Whether the estimate is of these records and this model.
+    own: bool,
 }
 
 impl Entrant {
@@ -135,7 +137,7 @@ fn entrant(
     let problem = watched(&loaded, &one.of_fit, terminal)?.problem()?;
     let Some(path) = stored else {
         let estimate = problem.run()?;
-        return Ok(Entrant { title: name.to_owned(), loaded, problem, estimate });
+        return Ok(Entrant { title: name.to_owned(), loaded, problem, estimate, own: true });
     };
     let (estimate, title) = (estimate(&path)?, format!("{name} ({})", path.display()));
     if estimate.layout.parameters != loaded.model.equations().layout().parameters {
@@ -143,7 +145,9 @@ fn entrant(
     }
     let own = estimate.own_parameters().into_iter().map(|j| estimate.parameters[j].name.as_str());
     shared(&title, &own.collect::<Vec<_>>(), validation)?;
-    let entrant = Entrant { title, loaded, problem, estimate };
+    // One that is of other records or of an earlier version of the model has criteria of its own.
+    let own = problem.reproduces(&estimate).unwrap_or(false);
+    let entrant = Entrant { title, loaded, problem, estimate, own };
     entrant.say_places(files, terminal);
     Ok(entrant)
 }
@@ -168,11 +172,16 @@ fn summary(entrants: &[Entrant]) -> Section {
         let unknowns = Cell::from(one.estimate.unknowns.len() as u64);
         [
             Cell::from(one.title.as_str()),
+            Cell::from(one.estimate.severity().to_string()),
             unknowns,
-            Cell::number(one.estimate.cost, 6),
-            Cell::optional(one.estimate.aic(), 6),
+            Cell::optional(one.own.then_some(one.estimate.cost), 6),
+            Cell::optional(one.estimate.aic().filter(|_| one.own), 6),
         ]
     };
-    let table = Table::new("Criteria", ["model", "unknowns", "cost", "AIC"]).rows(entrants.iter().map(row));
-    Section::new("criteria", "Criteria of each model").table(table)
+    let table = Table::new("Criteria", ["model", "verdict", "unknowns", "cost", "AIC"]).rows(entrants.iter().map(row));
+    let section = Section::new("criteria", "Criteria of each model").table(table);
+    match entrants.iter().all(|one| one.own) {
+        true => section,
+        false => section.says("An estimate without cost and AIC is of other records, or of a model that has changed since; its verdict is that of its fit."),
+    }
 }

@@ -27,7 +27,18 @@ pub fn examined(refit: &Refit, terminal: &Terminal) -> Result<Examined, Failure>
     let counter = Arc::new(AtomicU64::new(0));
     let problem = watched(&loaded, &refit.fitting.of_fit, terminal)?.counter(counter.clone()).problem()?;
     let estimate = match &refit.estimate {
-        Some(path) => estimate(path)?,
+        Some(path) => {
+            let found = estimate(path)?;
+            if !problem.reproduces(&found)? {
+                return Err(format!(
+                    "{}: with this model, these records and these options its errors are others than those with which it was found; name those of its \
+                     fit, or leave the estimate out",
+                    path.display()
+                )
+                .into());
+            }
+            found
+        }
         None => problem.run()?,
     };
     Ok(Examined { loaded, problem, estimate, counter })

@@ -5,10 +5,13 @@ use crate::arguments::{Order, RecordOptions};
 use crate::fitting::{expanded, initial, number, range};
 use crate::terminal::Terminal;
 use greybox::layout::Layout;
-use greybox::record::{Initial, Record};
+use greybox::record::{Channel, Initial, Record};
 use greybox::text::{self, Model};
 use greybox::{DataFile, DateOrder, Hold};
 use std::path::{Path, PathBuf};
+
+/// The part of an input's variance that may be lost by thinning without a word.
+const LOST: f64 = 0.01;
 
 /// Reads the records of a model, with the holds and the initial state that the model and the command line say.
 pub fn all(
@@ -30,7 +33,7 @@ pub fn one(
     terminal: &Terminal,
 ) -> Result<Record, Failure> {
     let layout = model.equations().layout();
-    prepared(read(path, model, layout, options, terminal)?, model, options, of_initial)
+    prepared(read(path, model, layout, options, terminal)?, model, options, of_initial, Some(terminal))
 }
 
 /// Reads the inputs alone, of a model that has any, and, if `measured`, outputs from whose first sample the initial state is to be taken.
@@ -46,7 +49,7 @@ pub fn inputs(
     if !layout.inputs.is_empty() {
         layout.outputs = vec![];
     }
-    let inputs = prepared(read(path, model, &layout, options, terminal)?, model, options, of_initial)?;
+    let inputs = prepared(read(path, model, &layout, options, terminal)?, model, options, of_initial, Some(terminal))?;
     match inputs.initial_state() {
         Initial::FirstSample if measured && layout.outputs.is_empty() => {
             one(path, model, options, of_initial, terminal)
@@ -56,7 +59,13 @@ pub fn inputs(
 }
 
 /// The record with what is declared of its inputs and of the initial state, and the part of it that is used.
-fn prepared(record: Record, model: &Model, options: &RecordOptions, of_initial: &[String]) -> Result<Record, Failure> {
+fn prepared(
+    record: Record,
+    model: &Model,
+    options: &RecordOptions,
+    of_initial: &[String],
+    terminal: Option<&Terminal>,
+) -> Result<Record, Failure> {
     let layout = model.equations().layout();
     let record = model.prepare(record)?;
     let said = initial(layout, of_initial, record.initial_state())?;
@@ -72,9 +81,35 @@ fn prepared(record: Record, model: &Model, options: &RecordOptions, of_initial: 
         record = record.between(from.unwrap_or(f64::NEG_INFINITY)..to.unwrap_or(f64::INFINITY))?;
     }
     Ok(match options.every {
-        Some(n) => model.thinned(&record, n)?,
+        Some(n) => {
+            let thinned = model.thinned(&record, n)?;
+            if let Some(terminal) = terminal {
+                say_lost(&record, &thinned, n, terminal);
+            }
+            thinned
+        }
         None => record,
     })
+}
+
+/// Says which inputs change between the samples that are kept, by the part of their variance that their means have not.
+fn say_lost(record: &Record, thinned: &Record, n: usize, terminal: &Terminal) {
+    let variance = |values: &[f64]| {
+        let mean = values.iter().sum::<f64>() / values.len() as f64;
+        values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / values.len() as f64
+    };
+    let lost = |(before, after): (&Channel, &Channel)| {
+        let part = 1.0 - variance(&after.values) / variance(&before.values);
+        (part > LOST).then(|| format!("`{}` {:.0} %", before.name, 100.0 * part))
+    };
+    let lost: Vec<String> = record.inputs().iter().zip(thinned.inputs()).filter_map(lost).collect();
+    if !lost.is_empty() {
+        terminal.remark(format_args!(
+            "--every {n}: inputs change between the samples that are kept, and lose a part of their variance ({}): what is fast in the plant is \
+             biased, which no interval allows for; keep more samples",
+            lost.join(", ")
+        ));
+    }
 }
 
 fn hold(input: &str, text: &str) -> Result<Hold, Failure> {
@@ -98,7 +133,7 @@ pub fn groups(
 ) -> Result<Vec<Group>, Failure> {
     let layout = model.equations().layout();
     let record = |record: Result<Record, greybox::Error>| {
-        prepared(record.map_err(|error| error.to_string())?, model, options, of_initial)
+        prepared(record.map_err(|error| error.to_string())?, model, options, of_initial, None)
             .map_err(|error| error.to_string())
     };
     let groups = file(path, model, layout, options)?.read_groups(layout, by)?;

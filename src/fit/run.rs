@@ -1,6 +1,7 @@
 //! Running a problem: search, estimate at a given point, objective, prediction, states.
 
 use super::further::{self, leaves_unexplained};
+use super::moves::{LEAST_NOISE, Moves};
 use super::predict::asked;
 use super::refine::{Attempt, Start, after, with_work_of};
 use super::search::{at_end, search, settled};
@@ -10,7 +11,7 @@ use super::start_error::start_error;
 use super::starts::search_from_many;
 use crate::covariance::SearchEnd;
 use crate::error::Error;
-use crate::estimate::Summary;
+use crate::estimate::{OutputEstimate, Summary};
 use crate::judge::conclude;
 use crate::optimize::{Domain, LeastSquares, LevenbergMarquardt, Outcome};
 use crate::problem::{Control, Lead, Objective, Problem, SearchPlan, Settings, Simulated, Whitening, noise};
@@ -254,6 +255,26 @@ impl Problem<'_> {
             false => problem.objective()?.whitening,
         };
         Ok((problem.in_units(control).with(whitening), estimate.coordinates()))
+    }
+
+    /// Whether the errors of this model with an estimate are on these records those with which the estimate was found, up to a hundredth: if not, it is of
+    /// another model, of other records or of other options, and says nothing of these. True also where a weighting or a pre-filter counts errors
+    /// differently, which is not looked at.
+    ///
+    /// # Errors
+    /// An estimate with other unknowns, or with which these records cannot be predicted.
+    pub fn reproduces(&self, estimate: &Summary) -> Result<bool, Error> {
+        const APART: f64 = 0.01;
+        if self.settings.weights.is_some() || self.settings.prefilter.is_some() {
+            return Ok(true);
+        }
+        let (objective, x) = self.at(estimate)?;
+        let errors = noise::errors(&objective, &x).map_err(|error| start_error(&objective, &x, error))?;
+        let moves = |j: usize| Moves::of(self.records.iter().map(|record| (record, &record.outputs()[j]))).half;
+        let is_same = |(j, (found, output)): (usize, (f64, &OutputEstimate))| {
+            (found - output.fit.rmse).abs() <= APART * output.fit.rmse + LEAST_NOISE * moves(j)
+        };
+        Ok(errors.into_iter().zip(&estimate.outputs).enumerate().all(is_same))
     }
 
     fn check_estimate(&self, estimate: &Summary) -> Result<(), Error> {

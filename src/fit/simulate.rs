@@ -4,7 +4,7 @@ use super::Fit;
 use super::fittable::{AnyStepping, Made};
 use crate::equations::Equations;
 use crate::error::Error;
-use crate::layout::{Layout, Quantity};
+use crate::layout::{Kind, Layout, Quantity};
 use crate::parameter::{Parameter, fixed};
 use crate::problem::{Control, Problem, Settings};
 use crate::record::{Channel, Initial, Record};
@@ -32,7 +32,8 @@ impl Fit<'_, Equations> {
             Ok::<_, Error>(problem.in_units(&Control::NEVER).predict(0, &[])?.outputs)
         };
         let (mut outputs, mut before) = (by(self.stepping.as_ref()), f64::INFINITY);
-        let finer = if self.stepping.is_none() { self.model.finer(true) } else { vec![] };
+        let chosen = self.stepping.is_some() || self.model.layout().kind != Kind::Continuous;
+        let finer = if chosen { vec![] } else { self.model.finer(true) };
         for (_, stepping) in &finer {
             let again = by(Some(stepping));
             let change = outputs.as_ref().ok().zip(again.as_ref().ok()).map_or(f64::INFINITY, |(a, b)| change(a, b));

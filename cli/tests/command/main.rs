@@ -32,6 +32,26 @@ fn fit_prints_the_estimate_and_writes_what_is_asked_for() {
     assert_eq!(error, "");
 }
 
+/// A voltage that changes between two samples of three is said to be lost with them, not one that is held for many.
+#[test]
+fn thinning_says_what_inputs_lose() {
+    let bench = Bench::new();
+    let text = std::fs::read_to_string(bench.path("record.csv")).unwrap();
+    let moved = |(k, line): (usize, &str)| {
+        let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
+        if k > 0 {
+            cells[2] = (cells[2].parse::<f64>().unwrap() + 100.0 * f64::from(k as u32 % 2)).to_string();
+        }
+        cells.join(",") + "\n"
+    };
+    std::fs::write(bench.path("moving.csv"), text.lines().enumerate().map(moved).collect::<String>()).unwrap();
+    let of =
+        |n: &str| String::from_utf8(bench.run(&["check", "pmsm.toml", "moving.csv", "--every", n]).stderr).unwrap();
+    let (one, three) = (of("1"), of("3"));
+    assert!(!one.contains("--every") && three.contains("--every 3: inputs change"), "{one} {three}");
+    assert!(three.contains("`uq` ") && !three.contains("`w` "), "{three}");
+}
+
 /// No result takes the place of what the command reads, nor of another result, also by another path to the same file.
 #[test]
 fn results_take_no_place_of_what_is_read() {
@@ -296,6 +316,22 @@ fn estimates_are_examined_and_compared() {
     let (out, _) = bench.ends(0, &words);
     assert!(out.contains("pmsm.toml") && out.contains("wrong.toml"), "{out}");
     assert!(std::fs::read_to_string(bench.path("c.html")).unwrap().contains("wrong.toml"));
+    // Each has its verdict.
+    let line = |name: &str| out.lines().rfind(|line| line.starts_with(name)).unwrap().to_owned();
+    assert!(line("pmsm.toml").contains(" usable ") && line("wrong.toml").contains("not usable"), "{out}");
+    // An estimate of a model that has changed since, or of another record, says nothing of these.
+    for words in [["wrong.toml", "record.csv"], ["pmsm.toml", "part.csv"]] {
+        let text = std::fs::read_to_string(bench.path("record.csv")).unwrap();
+        let reversed = text.lines().map(|line| line.replace("-", "")).collect::<Vec<_>>().join("\n") + "\n";
+        std::fs::write(bench.path("part.csv"), reversed).unwrap();
+        for command in ["residuals", "profile", "bootstrap"] {
+            let (_, error) = bench.ends(1, &[&[command], &words[..], &["--estimate", "e.json"]].concat());
+            assert!(error.contains("e.json: with this model"), "{error}");
+        }
+        let compared = bench.run(&["compare", "--model", &format!("{}:e.json", words[0]), words[1]]);
+        let out = String::from_utf8(compared.stdout).unwrap().replace('\n', " ");
+        assert!(out.contains("is of other records, or of a model that has changed since"), "{out}");
+    }
 }
 
 #[test]
