@@ -171,7 +171,7 @@ fn a_static_model_needs_no_time() {
         ("static_ms.csv", "time_ms,x,y", "60000,7,8\n120000,9,10\n"),
         ("static_date.csv", "Date,x,y", "2025-03-20 14:05,7,8\n2025-03-20 14:06,9,10\n"),
     ] {
-        let record = Experiment::from_file(&Line, file(name, &format!("{header}\n{rows}"))).unwrap();
+        let record = Experiment::from_file(&Line, file(name, format!("{header}\n{rows}"))).unwrap();
         assert_eq!(record.time(1) - record.time(0), 60.0, "{header}");
     }
     // Neither the column of a signal nor a temperature is a time.

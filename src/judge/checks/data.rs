@@ -161,6 +161,14 @@ fn missing(evidence: &Evidence<'_>, found: &[Arc<Inspection>]) -> Vec<Warning> {
     outputs.filter_map(one).collect()
 }
 
+/// The number of values and the quantization step, where there are more than [`FEW`], all multiples of one step apart.
+pub(crate) fn steps(values: &[f64]) -> Option<(usize, f64)> {
+    let apart = || values.windows(2).map(|pair| pair[1] - pair[0]);
+    let step = apart().reduce(f64::min)?;
+    let multiple = |apart: f64| (apart / step - (apart / step).round()).abs() < 1e-6;
+    (values.len() > FEW && apart().all(multiple)).then_some((values.len(), step))
+}
+
 #[cfg(test)]
 mod tests {
     use super::instants;
@@ -177,12 +185,4 @@ mod tests {
         assert_eq!(of([0.0, 0.0, 1.0, 2.0], [5.0; 4]), 3);
         assert_eq!(of([0.0, 0.0, 1.0, 2.0], [5.0, 5.0, f64::NAN, 5.0]), 2);
     }
-}
-
-/// The number of values and the quantization step, where there are more than [`FEW`], all multiples of one step apart.
-pub(crate) fn steps(values: &[f64]) -> Option<(usize, f64)> {
-    let apart = || values.windows(2).map(|pair| pair[1] - pair[0]);
-    let step = apart().reduce(f64::min)?;
-    let multiple = |apart: f64| (apart / step - (apart / step).round()).abs() < 1e-6;
-    (values.len() > FEW && apart().all(multiple)).then_some((values.len(), step))
 }

@@ -72,6 +72,9 @@ fn starts(evidence: &Evidence<'_>) -> Vec<Warning> {
     evidence.point.end.starts.as_ref().map_or(vec![], of)
 }
 
+/// A question about a minimum.
+type OfMinimum<'a> = &'a dyn Fn(&Minimum) -> bool;
+
 /// Warnings about an estimate that is the best end of these searches, with errors that are colored or not. Where searches were not asked
 /// for, a minimum that is found once lowers the verdict no more than one that is found without other searches does. But one that is found
 /// once by many searches and leaves colored errors is seldom the right one: what is colored there is what the model does not explain.
@@ -83,7 +86,7 @@ fn warnings(
     measurements: u64,
     asked: bool,
     colored: bool,
-    (has_signs, of_step): (&dyn Fn(&Minimum) -> bool, &dyn Fn(&Minimum) -> bool),
+    (has_signs, of_step): (OfMinimum<'_>, OfMinimum<'_>),
 ) -> Vec<Warning> {
     let Starts { tried, agreed, minima, declared, failed, .. } = starts;
     let mut warnings = vec![];
