@@ -5,9 +5,9 @@ use crate::optimize::{Domain, LeastSquares, LevenbergMarquardt, Linearization, M
 use crate::problem::{Objective, Role, Round};
 use crate::scaling::OwnSize;
 
-/// How far beside a kink slopes are taken, as a part of the unknown: searches were seen to end within 1e-9 of the kink, and over this distance the
-/// slope of a smooth cost changes little.
-const BESIDE: f64 = 1e-5;
+/// How far beside a kink slopes are taken, as a part of the unknown: searches were seen to end within 1e-8 of the kink, and over this distance the
+/// slope of a smooth cost changes little, also where the plant is twenty times as fast as the dead time.
+const BESIDE: f64 = 1e-6;
 /// Slopes before and behind a point jump if they differ by more than so many times what the curvature of a smooth cost makes of the distance.
 const JUMP: f64 = 10.0;
 /// Most searches with unknowns kept at kinks: in the first one others may run into kinks of their own.

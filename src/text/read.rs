@@ -42,7 +42,9 @@ pub(super) fn read(source: &Arc<Source>) -> Result<(Document, Vec<Remark>), Vec<
     let file = DeTable::parse(&source.text).map_err(|error| {
         let at = error.span().unwrap_or(0..0);
         let title = error.message().lines().collect::<Vec<_>>().join("; ");
-        vec![Remark::error(source, at, title).help("expressions and units stand in quotes".to_owned())]
+        vec![Remark::error(source, at, title).help(
+            "expressions and units stand in quotes, and numbers have digits on both sides of the point".to_owned(),
+        )]
     })?;
     let values = Values { source: source.clone(), errors: vec![], warnings: vec![] };
     let mut reader = Reader { values, units: BTreeMap::new(), unknown: BTreeSet::new() };

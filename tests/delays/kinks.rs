@@ -3,8 +3,8 @@
 use crate::{Excess, Heated, Process, Sensor, Valve};
 use greybox::*;
 
-/// 240 samples of a lag of 4 s behind a dead time of 3 s, whose input is held for 4 to 7 s at a time.
-fn record(seed: u64) -> ExperimentOf<Heated> {
+/// 240 samples of a lag of `tau` behind a dead time of `theta` (s), whose input is held for 4 to 7 s at a time.
+fn record(seed: u64, tau: f64, theta: f64) -> ExperimentOf<Heated> {
     let (mut level, mut left, mut state) = (1.0, 0, seed);
     let mut input = |k: usize| {
         if left == 0 {
@@ -15,7 +15,7 @@ fn record(seed: u64) -> ExperimentOf<Heated> {
         Valve { u: if k < 7 { 0.0 } else { level } }
     };
     let inputs: Vec<Valve> = (0..240).map(&mut input).collect();
-    let truth = Process { y0: 0.0, k: 2.0, tau: 4.0, theta: 3.0 };
+    let truth = Process { y0: 0.0, k: 2.0, tau, theta };
     let time = Time::Uniform { start: 0.0, step: 1.0 };
     let run = Simulator::new(&Heated).integrator(Rk4 { substeps: 8 }).run(&truth, &Excess { z: 0.0 }, time, &inputs);
     let record = run.unwrap().with_noise(Sensor { y: 0.05 }, seed).experiment(&Heated).unwrap();
@@ -33,7 +33,7 @@ fn fit(record: &ExperimentOf<Heated>, theta: Parameter) -> Estimate<Heated> {
 fn minima_at_a_whole_number_of_samples() {
     let mut at_the_kink = 0;
     for seed in 0..30 {
-        let record = record(seed);
+        let record = record(seed, 4.0, 3.0);
         let found = fit(&record, free(2.0).within(0.0, 20.0));
         assert!(found.outcome.converged(), "{seed}: {found}");
         assert!(found.severity() < Severity::NotUsable, "{seed}: {found}");
@@ -47,4 +47,18 @@ fn minima_at_a_whole_number_of_samples() {
         }
     }
     assert!((2..29).contains(&at_the_kink), "{at_the_kink}");
+}
+
+/// A lag shorter than a sample: the slope with respect to a dead time twenty times as long changes over a small part of it, and searches by a finer step
+/// creep towards the kink.
+#[test]
+fn minima_of_a_fast_plant() {
+    for seed in 0..30 {
+        let found = fit(&record(seed, 0.8, 15.0), free(10.0).within(0.0, 60.0));
+        assert!(found.severity() == Severity::Usable, "{seed}: {found}");
+        let errors = [(found.parameters.tau, 0.8, 1), (found.parameters.theta, 15.0, 2)]
+            .map(|(value, truth, i)| (value - truth).abs() / found.unknowns[i].knowledge.standard_error().unwrap());
+        // Four standard errors: one of 500 such fits by chance.
+        assert!(errors.into_iter().all(|errors| errors < 4.0), "{seed}: {errors:?} {found}");
+    }
 }

@@ -70,7 +70,9 @@ fn held_at_bound(unknowns: &[Unknown]) -> Vec<Warning> {
             };
             let reaches = match end {
                 Some(end) => {
-                    format!("; its 95 % interval reaches from {} to {}{unit}", exact(bound), number(end, 3))
+                    let (bound, end) =
+                        if end < bound { (number(end, 3), exact(bound)) } else { (exact(bound), number(end, 3)) };
+                    format!("; its 95 % interval reaches from {bound} to {end}{unit}")
                 }
                 None => String::new(),
             };
