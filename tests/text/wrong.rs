@@ -9,14 +9,14 @@ type Case = (&'static str, &'static str, &'static str, (usize, usize), &'static 
 #[rustfmt::skip]
 const CASES: &[Case] = &[
     // The file.
-    ("greybox = 1", "greybox 1", "key with no value, expected `=`", (2, 9), "expressions and units stand in quotes"),
+    ("greybox = 1", "greybox 1", "key with no value, expected `=`", (2, 9), "expressions and units stand in quotes, and numbers have digits on both sides of the point"),
     ("greybox = 1", "", "the file does not say which version of the format it has", (1, 1), "let it begin with `greybox = 1`"),
     ("greybox = 1", "greybox = 2", "this library reads version 1 of the format", (2, 11), ""),
     ("[inputs]", "[input]", "a model file has no `input`", (6, 2), "did you mean `inputs`?"),
     ("[inputs]", "inputs = 3\n[zzz]", "a model file has no `zzz`", (7, 2), "a model file may have: greybox, name, description, units, constants, inputs, parameters, tables, let, states, outputs, solver"),
     ("name = \"PMSM with surface magnets\"", "name = 3", "`name` is a number, where a text in quotes should stand", (3, 8), ""),
-    ("we = \"np*w\"", "we = np*w", "invalid float", (15, 6), "expressions and units stand in quotes"),
-    ("uq = \"V\"", "uq = \"V\"\nuq = \"A\"", "duplicate key", (9, 1), "expressions and units stand in quotes"),
+    ("we = \"np*w\"", "we = np*w", "invalid float", (15, 6), "expressions and units stand in quotes, and numbers have digits on both sides of the point"),
+    ("uq = \"V\"", "uq = \"V\"\nuq = \"A\"", "duplicate key", (9, 1), "expressions and units stand in quotes, and numbers have digits on both sides of the point"),
     // Quantities.
     ("rs = { unit = \"ohm\", start = 1.0,", "rs = { unit = \"ohm\", strat = 1.0,", "a parameter has no `strat`", (11, 22), "did you mean `start`?"),
     ("start = 0.7 }", "}", "parameter `ke` has neither `start` nor `fixed`", (13, 1), "give the value that the search starts from: start = 1.0"),
