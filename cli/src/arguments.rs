@@ -336,8 +336,8 @@ pub struct Fleet {
     #[command(flatten, next_help_heading = "Fit")]
     pub of_fit: FitOptions,
     /// The table, .csv or .parquet: one row for each record. Records that are in it, or in the journal of an interrupted run,
-    /// are not fitted again, but for those that failed and those of files that were written since. A file beside it, with `.run` at the end of its name, has the model
-    /// and the options that made it; rows of others are not added.
+    /// are not fitted again, but for those that failed and those of files that were written since. A file beside it, with
+    /// `.run` at the end of its name, has the model and the options that made it; rows of others are not added.
     #[arg(short, long, value_name = "FILE")]
     pub out: Option<PathBuf>,
 }

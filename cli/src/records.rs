@@ -10,7 +10,7 @@ use greybox::text::{self, Model};
 use greybox::{DataFile, DateOrder, Hold};
 use std::path::{Path, PathBuf};
 
-/// The part of an input's variance that may be lost by thinning without a word.
+/// The part of an input's variance that thinning may remove without a remark: a tenth of its deviation.
 const LOST: f64 = 0.01;
 
 /// Reads the records of a model, with the holds and the initial state that the model and the command line say.

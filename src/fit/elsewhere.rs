@@ -72,7 +72,7 @@ impl Problem<'_> {
         Some(Warning::new(WarningCode::Staged, Severity::Usable, text.to_owned()).about(About::Search))
     }
 
-    /// Whether a single simulated search from the declared start, as far as it was told, led to where errors are colored.
+    /// Whether the errors of a simulation are colored, where a single search from the declared start was asked for.
     fn leads_to_color(&self, found: &Summary) -> bool {
         let is_colored =
             |warning: &Warning| warning.code == WarningCode::ColoredErrors && warning.severity > Severity::Usable;
@@ -144,7 +144,7 @@ impl Problem<'_> {
             return Some(staged.map_or(Further::TooLong(reason, most), further));
         }
         let is_usable = |best: &Summary| best.severity() < Severity::NotUsable;
-        // An end that explains more than the first one may be stuck as that was.
+        // Stages from which the search ends at no minimum do not suffice where the first search ended at none.
         let is_new = |best: &Summary| matches!(reason, Reason::Unexplained) || best.outcome.converged();
         let suffices =
             |best: &Summary| is_usable(best) || is_new(best) && !leaves_unexplained(best) && self.is_near_noise(best);

@@ -1,4 +1,4 @@
-//! Searches from places near an estimate where the cost is rough: of minima that lie side by side a search ends in any of them.
+//! Searches from places near an estimate where the cost is not smooth, and may have several minima within the errors of each other.
 
 use super::search::{at_end, settled};
 use super::starts::search_from_many;
@@ -24,8 +24,9 @@ const LONGEST: usize = 5_000;
 const ROUGH: &str = "the errors are colored, and the cost does not rise as its slopes say beside";
 
 impl Problem<'_> {
-    /// The estimate after searches from places near it, with a note, where its errors are colored and the cost does not rise as its slopes say: that of the
-    /// lowest minimum that they found, or the same with their work. `None` where none are made, also for long records.
+    /// The estimate at the lowest minimum that searches from places near an estimate find, with a warning; the same estimate with a note where none is lower.
+    /// Both with the evaluations of all searches. `None` where no such search is made: errors are not colored, the cost rises as its slopes say, or
+    /// the records are long.
     pub(super) fn searched_nearby(&self, found: &Summary, control: &Control) -> Option<Summary> {
         let longest = if self.runs_in_lanes() { LONGEST_IN_LANES } else { LONGEST };
         let is_warned =

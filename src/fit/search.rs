@@ -317,7 +317,7 @@ fn first_whitening(plain: &Objective<'_>, start: &[f64]) -> Result<(Whitening, M
     noise::first_whitening(plain, start).map_err(|error| start_error(plain, start, error))
 }
 
-/// A search that was ended by a limit of fewer trial steps is not looked at for a kink.
+/// A search that was ended by a limit of fewer trial steps is not examined for a kink: as many as a part of a search by a finer method has.
 const CREPT: u64 = 20;
 
 /// A round that found no further step has ended at a minimum all the same where the model reproduces the data, to the tolerance of an
@@ -343,7 +343,7 @@ pub(super) fn ended(objective: &Objective<'_>, mut round: Round) -> Round {
         round.outcome = rough;
     }
     let lost = matches!(round.outcome, Outcome::Stalled { .. } | Outcome::Creeping { .. } | Outcome::Rough { .. });
-    // Towards a kink, steps may become shorter and shorter until a limit.
+    // Steps towards a kink may become shorter without end, until a limit of trial steps.
     let crept = matches!(round.outcome, Outcome::IterationLimit { iterations } if iterations >= CREPT);
     match (lost || crept) && !round.outcome.converged() {
         true => at_kink(objective, &round).unwrap_or(round),

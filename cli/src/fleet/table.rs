@@ -65,19 +65,17 @@ impl Table {
         };
         let written = table.own(path, written)?;
         let journal = beside(path, ".journal");
-        let since = [path, &journal].map(|path| std::fs::metadata(path).ok());
-        // Rows are added to a journal one by one; what was written after the first may have been read before.
-        let [written_at, begun_at] = [
-            since[0].as_ref().and_then(|file| file.modified().ok()),
-            since[1].as_ref().and_then(|file| file.created().or_else(|_| file.modified()).ok()),
-        ];
+        let written_at = std::fs::metadata(path).and_then(|file| file.modified()).ok();
+        // A journal grows row by row: a file that was written after its first row may have been read before.
+        let begun = std::fs::metadata(&journal).and_then(|file| file.created().or_else(|_| file.modified()));
+        let begun_at = begun.ok();
         let (journal, unfinished) = Journal::open(&journal, &table.header.names, &table.made_by)?;
         table.journal = Some(journal);
         let (mut changed, mut latest) = (HashSet::new(), HashMap::new());
         let dated =
             written.into_iter().map(|row| (row, written_at)).chain(unfinished.into_iter().map(|row| (row, begun_at)));
-        // A run that was killed between writing the table and removing its journal has the rows twice; an error may have become an answer, and a
-        // changed file has another row.
+        // The last row of a record counts: after a kill a row may stand in the table and in the journal, a record that failed may have been fitted since,
+        // and so may a file that has changed.
         let mut rows: Vec<Option<Row>> = vec![];
         for (row, at) in dated {
             if is_newer(&row.name.record, at) {

@@ -94,7 +94,7 @@ impl DataFile {
         below: impl Fn(usize) -> Option<&'b str>,
     ) -> Result<Plan<'a>, Error> {
         let signals: Vec<&Quantity> = layout.inputs.iter().chain(&layout.outputs).collect();
-        // A static model needs no time: without a column that tells it, beside those of the signals, its rows are numbered.
+        // A static model needs no time: its rows are numbered where no column but those of its signals may be that of the time.
         let others = || {
             let taken: Vec<usize> = signals.iter().filter_map(|signal| self.place(names, &signal.name).ok()).collect();
             names.iter().enumerate().filter(move |(at, _)| !taken.contains(at)).map(|(_, name)| name)
