@@ -11,7 +11,7 @@ import numpy as np
 from greybox import _core
 from greybox.errors import Error
 from greybox.estimate import VERDICTS
-from greybox.frames import Frame, is_readonly, place, rename, seconds, time_column
+from greybox.frames import Frame, is_readonly, place, rename, seconds, steps, time_column
 from greybox.model import Model, checked
 from greybox.options import Options, settings
 from greybox.parameters import Parameter, declared, together
@@ -98,7 +98,8 @@ class Plan:
         if self.record.sample_time is not None:
             raise Error("a shuffle does not keep the order of samples, which sample_time needs; add a column of the time")
         needed = self.needed(names)
-        time = time_column(names, self.record.time)
+        signals = [column for _, column, _ in self._signals()]
+        time = time_column(names if self.record.time else [name for name in names if name not in signals], self.record.time)
         if time is None and self.record.time is not None:
             raise Error(f"there is no column `{self.record.time}`; the frame has: {near(self.record.time, names)}")
         if time is None:
@@ -139,18 +140,23 @@ class Plan:
         columns = {column: frame.column(column, signal, unit) for signal, column, unit in self._signals()}
         readonly = {name: is_readonly(column) for name, column in columns.items()}
         step = self.record.sample_time
-        times, what = (np.zeros(0), "") if step is not None else frame.stamps(self.record.time)
+        signals = [column for _, column, _ in self._signals()]
+        # Beside a sample time, the times of a column are compared with it.
+        times, what = frame.stamps(self.record.time, signals) if step is None else frame.beside(signals) or (None, "")
         records: list[_core.Record] = []
         failed: dict[int, str] = {}
         for k, rows in enumerate(places):
-            here = np.arange(_length(rows)) * step if step is not None else times[rows]
+            here = np.zeros(0) if times is None else times[rows]
             if ordered and step is None and (here[1:] < here[:-1]).any():
                 order = np.argsort(here, kind="stable")
                 rows, here = (np.arange(rows.start, rows.stop) if isinstance(rows, slice) else rows)[order], here[order]
             # A part of an array that nothing writes to is shared; rows that are gathered are a copy already.
             part = {name: (column[rows], readonly[name] or not isinstance(rows, slice)) for name, column in columns.items()}
             try:
-                records.append(self.record.of(self.equations, labels[k], seconds(here, what), part))
+                time = np.zeros(0) if times is None else seconds(here, what)
+                if step is not None:
+                    time = steps(step, _length(rows), None if times is None else (time, what))
+                records.append(self.record.of(self.equations, labels[k], time, part))
             except Error as error:
                 failed[k] = str(error)
         with Progress(progress, "fleet", len(records)) as shown:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import mmap
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -13,12 +13,15 @@ from greybox import _core
 from greybox.errors import Error, RecordWarning, in_python, warn
 from greybox.signals import near
 
-__all__ = ["Array", "Frame", "Kind", "has_times", "is_readonly", "place", "rename", "seconds", "time_column"]
+__all__ = ["Array", "Frame", "Kind", "has_times", "is_readonly", "place", "rename", "seconds", "steps", "time_column"]
 
 Array: TypeAlias = "np.ndarray[Any, np.dtype[np.float64]]"
 
 #: Makes a frame of columns, of the kind that the caller handed over.
 Kind: TypeAlias = Callable[[Mapping[str, Any]], Any]
+
+#: The part of a sample time by which times of a column may differ from it, as rounded ones do.
+_SAME = 0.01
 
 #: Units of numbers that count from 1970.
 _SINCE_1970 = {1e-3: "milliseconds", 1e-6: "microseconds", 1e-9: "nanoseconds"}
@@ -101,21 +104,27 @@ class Frame:
         # The index of pandas has the places of the rows in the frame.
         return nw.maybe_reset_index(self._frame.get_column(name)[rows]).to_native()
 
-    def time(self, name: str | None, sample_time: float | None, rows: int) -> Array:
-        """Give the time of each row in seconds; of dates, since the first.
+    def time(self, name: str | None, sample_time: float | None, rows: int, signals: Collection[str] = ()) -> Array:
+        """Give the time of each row in seconds; of dates, since the first. Columns of `signals` are the time only where `name` says so.
 
         Raises
         ------
         Error
-            If there is no time, it is neither numbers nor dates, or dates do not increase.
+            If there is no time, it is neither numbers nor dates, dates do not increase, or a column says another time than `sample_time`.
         """
-        if sample_time is not None:
-            if not (np.isfinite(sample_time) and sample_time > 0.0):
-                raise Error(f"the sample time is {sample_time!r}; it must be positive and finite (s)")
-            return np.arange(rows, dtype=np.float64) * float(sample_time)
-        return seconds(*self.stamps(name))
+        if sample_time is None:
+            return seconds(*self.stamps(name, signals))
+        if not (np.isfinite(sample_time) and sample_time > 0.0):
+            raise Error(f"the sample time is {sample_time!r}; it must be positive and finite (s)")
+        beside = self.beside(signals)
+        return steps(float(sample_time), rows, None if beside is None else (seconds(*beside), beside[1]))
 
-    def stamps(self, name: str | None) -> tuple[Any, str]:
+    def beside(self, signals: Collection[str]) -> tuple[Any, str] | None:
+        """Give the time of a column that is no signal's, beside a sample time."""
+        found = time_column([one for one in self.names if one not in signals])
+        return None if found is None else self.stamps(found)
+
+    def stamps(self, name: str | None, signals: Collection[str] = ()) -> tuple[Any, str]:
         """Give the time of each row as it stands, in seconds or as a duration in nanoseconds, and where it stands.
 
         Raises
@@ -124,7 +133,7 @@ class Frame:
             If there is none, or it is neither numbers nor dates. What is missing is refused by :func:`seconds`.
         """
         index = None if getattr(self.index, "name", None) is None else str(self.index.name)
-        found = time_column(self.names, name)
+        found = time_column([one for one in self.names if one not in signals] if name is None else self.names, name)
         if found is None and name is None and self.index is None:
             raise Error(
                 f"there is no column `t` or `time`, and no index of times; the frame has: {near('t', self.names)}. Name the column "
@@ -141,6 +150,24 @@ class Frame:
         column = self._frame.get_column(found)
         dated = _dated(column)
         return (_counted(_stamps(column.to_numpy(), what), found) if dated is None else dated), what
+
+
+def steps(sample_time: float, rows: int, beside: tuple[Array, str] | None) -> Array:
+    """Give times a sample time apart, beside the times of a column, if there is one.
+
+    Raises
+    ------
+    Error
+        If these are others.
+    """
+    between = np.zeros(0) if beside is None else np.diff(beside[0])
+    other = between[~(np.abs(between - sample_time) <= _SAME * sample_time)]
+    if beside is not None and len(other):
+        raise Error(
+            f"sample_time={sample_time!r} and {beside[1]}, where {other[0]:.6g} s lie between samples, both give the time of the samples; "
+            "leave sample_time out, or drop the column"
+        )
+    return np.arange(rows, dtype=np.float64) * sample_time
 
 
 def place(names: Sequence[str], column: str, signal: str, unit: str) -> str | None:

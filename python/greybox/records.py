@@ -42,7 +42,7 @@ class Record:
         The name in reports and errors; without it that of the file, without its ending.
     time : str, optional
         The column of the time: dates, which count from the first, or numbers in seconds or in the unit that its name says (``t [ms]``,
-        ``time_ms``). Without it, the column ``t`` or ``time``, with a unit or without, or else the index of a pandas frame.
+        ``time_ms``). Without it, the column ``t`` or ``time`` that is no signal's, with a unit or without, or else the index of a pandas frame.
     sample_time : float, optional
         The time between samples (s), where there is no column.
     columns : mapping from str to str, optional
@@ -58,7 +58,7 @@ class Record:
     Raises
     ------
     Error
-        If two of `time`, `sample_time` and `columns` of ``t`` are given.
+        If two of `time`, `sample_time` and `columns` of ``t`` are given, or `sample_time` beside a column of another time.
     """
 
     data: Any
@@ -100,7 +100,7 @@ class Record:
                     found[signal] = frame.column(of[signal], signal, unit)
                     rows = len(found[signal])
             rows = 0 if rows is None else rows
-            time = frame.time(self.time, self.sample_time, rows)
+            time = frame.time(self.time, self.sample_time, rows, of.values())
             _check_lengths({**{of[signal]: column for signal, column in {**columns, **found}.items()}}, time)
             missing = np.full(len(time), np.nan)
             given = {**columns, **{signal: found.get(signal, missing) for signal in measured}}

@@ -83,7 +83,8 @@ class Fit(Estimate):
         Returns
         -------
         frame
-            Of the kind that was handed over: ``t`` and the outputs; of several records, ``record`` before.
+            Of the kind that was handed over: ``t`` and the outputs; of several records, ``record`` before. Of a filter, NaN where nothing was
+            measured: :meth:`filtered` has the states there.
         """
         return self._predicted(data, said, lambda record, predicted, errors: predicted)
 
@@ -240,7 +241,8 @@ class Fit(Estimate):
         Warns
         -----
         FitWarning
-            If the time limit of the fit ended it after fewer refits. Ctrl-C ends it without a result.
+            If the time limit of the fit ended it after fewer refits, or single residuals were drawn though they are colored. Ctrl-C ends it without
+            a result.
         """
         count, seed = whole("count", count, 1), whole("seed", seed, 0)
         blocks = None if blocks is None else whole("blocks", blocks, 0)
@@ -250,6 +252,9 @@ class Fit(Estimate):
         if made.tried < count:
             text = f"the time limit ended the bootstrap after {made.tried} of {count} refits: the intervals are of these"
             warn(FitWarning("bootstrap_ended", "usable", text))
+        if blocks is None and any(warning.code == "colored_errors" for warning in self.warnings):
+            text = "the errors are colored, and single residuals were drawn: the intervals are too narrow; draw blocks=0 or more"
+            warn(FitWarning("colored_errors", "usable_with_care", text))
         return made
 
     def report(

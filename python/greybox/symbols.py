@@ -77,6 +77,10 @@ _NO_ANSWER = (
     "`if`, `and`, `or`, `not`, `while`, `a < b < c`, min and max ask for an answer, which only numbers have: the equations are read "
     "once, before there are numbers. Write gb.where(condition, a, b), where conditions combine by &, | and ~, np.minimum or np.maximum"
 )
+_NO_KEY = (
+    "a symbol is looked up in a dict or a set, which find values: the equations are read once, before there are numbers. Write "
+    "gb.where(x == 1, a, b), or np.interp for a table"
+)
 _NO_VALUE = (
     "float(), int(), round(), range(), the functions of `math` and writing into an array of floats ask a symbol for its value: the "
     "equations are read once, before there are numbers. Write np.sin for math.sin, np.floor for int, and np.stack or an array with "
@@ -243,7 +247,6 @@ class Symbol:
     """A quantity of a model while its code is read. It has operators and functions, and no value."""
 
     __slots__ = ("node", "trace")
-    __hash__ = object.__hash__
 
     def __init__(self, trace: Trace, node: _core.Node) -> None:
         self.trace = trace
@@ -324,6 +327,9 @@ class Symbol:
 
     def __bool__(self) -> NoReturn:
         refuse(_NO_ANSWER)
+
+    def __hash__(self) -> int:
+        refuse(_NO_KEY)
 
     def _value(self, *_: Any) -> NoReturn:
         refuse(_NO_VALUE)

@@ -2,10 +2,11 @@
 
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
+use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::panic::resume_unwind;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::thread;
 use std::time::Duration;
 
@@ -52,7 +53,7 @@ pub fn interruptible<T: Send>(
         let worker = named.spawn_scoped(scope, move || {
             // Dropped at the end, however that comes.
             let _ended = sender;
-            work()
+            in_this_process(work)
         });
         let worker = worker.map_err(|error| PyRuntimeError::new_err(error.to_string()))?;
         let (mut interrupted, mut again) = (None, None);
@@ -69,6 +70,32 @@ pub fn interruptible<T: Send>(
         let result = py.detach(|| worker.join()).unwrap_or_else(|panic| resume_unwind(panic));
         again.map_or(Ok(Ended { result, interrupted }), Err)
     })
+}
+
+/// Runs work that uses threads. A forked process has none of its parent's, for which rayon would wait for ever: it gets a pool of its own.
+fn in_this_process<T: Send>(work: impl FnOnce() -> T + Send) -> T {
+    static FIRST: OnceLock<u32> = OnceLock::new();
+    static FORKED: Mutex<Option<(u32, Arc<ThreadPool>)>> = Mutex::new(None);
+    let process = std::process::id();
+    if *FIRST.get_or_init(|| process) == process {
+        return work();
+    }
+    let mut forked = FORKED.lock().unwrap_or_else(PoisonError::into_inner);
+    let pool = match forked.take() {
+        Some((of, pool)) if of == process => Some(pool),
+        others => {
+            // The threads of its parent's pool cannot be told to end.
+            std::mem::forget(others);
+            ThreadPoolBuilder::new().build().ok().map(Arc::new)
+        }
+    };
+    *forked = pool.clone().map(|pool| (process, pool));
+    drop(forked);
+    // Without threads there is no other way than to work here.
+    match pool {
+        Some(pool) => pool.install(work),
+        None => work(),
+    }
 }
 
 fn wait(py: Python<'_>, receiver: &mut Receiver<()>) -> Result<(), RecvTimeoutError> {

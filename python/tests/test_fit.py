@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import os
 import pickle
 import subprocess
 import sys
 import warnings
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -279,6 +281,30 @@ def test_ctrl_c_returns_the_best_so_far_and_other_threads_run_meanwhile() -> Non
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=300, check=False)
     # Where even the start was not evaluated, there is no best, and the interrupt is raised.
     assert done.stdout.strip() == "cancelled | not usable | False" or "KeyboardInterrupt" in done.stderr, (done.stdout, done.stderr)
+
+
+FORKED = """
+import multiprocessing, sys
+sys.path.insert(0, TESTS)
+from conftest import cooled, cooling
+import greybox as gb
+fit = gb.fit(cooling(), cooled(), k=gb.free(1.0))
+draw = lambda: str(fit.bootstrap(20, seed=1).table())
+here = draw()
+context = multiprocessing.get_context("fork")
+ends, end = context.Pipe()
+child = context.Process(target=lambda: end.send([draw(), draw()]))
+child.start()
+print(ends.poll(60) and ends.recv() == [here, here])
+child.kill()
+"""
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="processes are not forked here")
+def test_a_forked_process_has_threads_of_its_own() -> None:
+    program = FORKED.replace("TESTS", repr(str(Path(__file__).parent)))
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=300, check=False)
+    assert done.stdout.strip() == "True", (done.stdout, done.stderr)
 
 
 def test_progress(capsys: pytest.CaptureFixture[str]) -> None:

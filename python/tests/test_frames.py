@@ -106,6 +106,29 @@ def test_time_by_name_and_by_rate() -> None:
     assert k_of({**c, "T_body": c["body"], "body": np.zeros(200)}, columns={"body": "T_body"}) == k_of(c)
 
 
+def test_a_signal_called_t_is_not_the_time() -> None:
+    c = cooled()
+    model = gb.model(
+        lambda t, x, u, p: [p.k * (u.room - x.t)], states={"t": "K"}, inputs={"room": "K"}, outputs={"t": "K"}, parameters={"k": "1/s"}
+    )
+    renamed = {"time": c["t"], "room": c["room"], "t": c["body"]}
+    index = pd.DataFrame(renamed).set_index("time")
+    for frame in (renamed, index):
+        assert float(gb.fit(model, frame, k=gb.free(1.0)).parameters.k) == k_of(c)
+    fleet = gb.fleet(model, {**renamed, "which": np.zeros(200)}, by="which", k=gb.free(1.0))
+    assert fleet["k"][0] == k_of(c)
+
+
+def test_a_sample_time_beside_a_column_of_another_time_is_refused() -> None:
+    c = cooled()
+    assert k_of(c, sample_time=0.1) == k_of(c)
+    says = r"sample_time=0.2 and column `t`, where 0.1 s lie between samples, both give the time"
+    with pytest.raises(gb.Error, match=says):
+        k_of(c, sample_time=0.2)
+    fleet = gb.fleet(cooling(), {**c, "which": np.zeros(200)}, by="which", sample_time=0.2, k=gb.free(1.0))
+    assert re.search(says, fleet["reason"][0])
+
+
 @pytest.mark.parametrize(
     ("name", "scale", "said"),
     [

@@ -149,6 +149,8 @@ REFUSED: list[tuple[Callable[[Any, Any], Any], str]] = [
     (lambda x, u: len(x), "entries by name"),
     (lambda x, u: list(x), "entries by name"),
     (lambda x, u: 1.0 in x, "entries by name"),
+    (lambda x, u: {1: 3.5}.get(x, 1.0), "gb.where(x == 1, a, b)"),
+    (lambda x, u: 1.0 if x in {1, 2} else 0.0, "gb.where(x == 1, a, b)"),
     (lambda x, u: x + "1", "cannot be combined with '1' (str)"),
     (lambda x, u: x + None, "cannot be combined with None"),
     (lambda x, u: x + 1j, "cannot be combined with 1j (complex)"),
