@@ -129,7 +129,7 @@ pub struct RecordOptions {
     #[arg(long, value_name = "ZONE")]
     pub zone: Option<String>,
     /// Time from a constant sample time (s) instead of a column.
-    #[arg(long, value_name = "SECONDS", conflicts_with_all = ["time", "time_unit", "date_order", "zone"])]
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, conflicts_with_all = ["time", "time_unit", "date_order", "zone"])]
     pub sample_time: Option<f64>,
     /// How an input behaves between samples: `w=first` (a straight line), `ud=zero` (held).
     #[arg(long, value_name = "INPUT=HOLD", value_parser = assignment)]
@@ -160,8 +160,8 @@ pub struct FitOptions {
     /// The loss: squared, huber, soft-l1, cauchy, tukey; with its constant: `huber:2`.
     #[arg(long)]
     pub loss: Option<String>,
-    /// The weight of each sample: an expression of time, inputs and outputs: `abs(w)`.
-    #[arg(long, value_name = "EXPRESSION")]
+    /// The weight of each sample: an expression of time and inputs: `abs(w)`. By outputs their noise biases the estimate.
+    #[arg(long, value_name = "EXPRESSION", allow_hyphen_values = true)]
     pub weight: Option<String>,
     /// A filter of the errors: order and cut-off (Hz), `low-pass:4,100`, `high-pass:2,0.5`; in a fleet the sample time (s), too:
     /// `low-pass:4,100,1e-3`.
@@ -187,7 +187,7 @@ pub struct FitOptions {
     #[arg(long, conflicts_with = "staged")]
     pub multiple_shooting: bool,
     /// End after so many seconds with the best so far.
-    #[arg(long, value_name = "SECONDS")]
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     pub time_limit: Option<f64>,
     /// Save the search to a file, and go on from it if it is there.
     #[arg(long, value_name = "FILE")]

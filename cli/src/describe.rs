@@ -6,7 +6,7 @@ use crate::terminal::Terminal;
 use crate::{Failure, Verdict, fit, output};
 use greybox::problem::Problem;
 use greybox::report::Section;
-use greybox::{Report, Summary};
+use greybox::{Report, Severity, Summary, Warning};
 use std::sync::Arc;
 use std::sync::atomic::AtomicU64;
 
@@ -57,8 +57,11 @@ pub fn said(
     // What is said of the sections alone, without the rest of the report.
     let mut short = Report { sections: vec![], severity, ..report.clone() };
     let mut whole = report;
+    // Why the estimate is not simply usable stands in a section that is left out here.
+    let mut reasons = estimate.warnings.iter().filter(|warning| warning.severity > Severity::Usable);
     for section in sections {
-        short = short.with(section.clone());
+        let with = |section: Section, reason: &Warning| section.because(reason.severity, reason.text.clone());
+        short = short.with(reasons.by_ref().fold(section.clone(), with));
         whole = whole.with(section);
     }
     output::line(if terminal.colored() { short.to_colored_text() } else { short.to_string() })?;

@@ -78,6 +78,11 @@ fn prepared(
     }
     if let Some(text) = &options.between {
         let (from, to) = range("--between", text)?;
+        if let (Some(from), Some(to)) = (from, to)
+            && from > to
+        {
+            return Err(format!("--between {text}: the second time is before the first; write {to}..{from}").into());
+        }
         record = record.between(from.unwrap_or(f64::NEG_INFINITY)..to.unwrap_or(f64::INFINITY))?;
     }
     Ok(match options.every {
