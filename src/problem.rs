@@ -48,7 +48,7 @@ pub use simulate::Simulated;
 pub(crate) use together::{At, Slopes, gather_together, gather_together_beside, linearize_together};
 pub use unknowns::Role;
 pub(crate) use unknowns::{Free, Unknowns, Values};
-use weighing::Weighing;
+pub(crate) use weighing::Weighing;
 pub(crate) use whitening::{Noise, Whitening};
 
 use crate::error::Error;

@@ -370,7 +370,8 @@ pub trait Sweep: Send + Sync {
         None
     }
 
-    /// Of a predictor that takes process noise: the same with terms that the equations might lack; `None` where these are not known.
+    /// Of a predictor that takes process noise, or of a simulation: the same with terms that the equations might lack; `None` where these are not
+    /// known.
     fn with_terms<'s>(&'s self) -> Option<Lacking<'s>> {
         None
     }

@@ -5,13 +5,15 @@ use super::leverages::leverages;
 use super::{Pinned, check_complete, minimize};
 use crate::covariance::leverage::LEAST;
 use crate::error::Error;
-use crate::estimate::Summary;
+use crate::estimate::{Summary, WarningCode};
+use crate::layout::Kind;
 use crate::numeral::resolved;
 use crate::optimize::LeastSquares;
 use crate::problem::{Problem, Simulated, each};
 use crate::random::Random;
 use crate::record::Record;
 use crate::section::{Cell, Section, Table};
+use crate::severity::Severity;
 use serde::{Deserialize, Serialize};
 use std::sync::atomic::Ordering;
 use std::time::Instant;
@@ -49,8 +51,12 @@ pub struct Bootstrap {
     pub intervals: Vec<(f64, f64)>,
     /// The seed that makes the same again.
     pub seed: u64,
+    /// Whether single residuals were drawn although they are colored: the intervals are too narrow.
+    #[serde(default)]
+    pub colored: bool,
 }
 
+const SINGLE: &str = "the errors are colored, and the bootstrap drew single residuals: its intervals are too narrow; draw blocks of residuals";
 /// The fewest refits that have percentiles.
 const FEWEST: usize = 20;
 /// Refits run side by side; at most so many are left out where a time limit or a flag ends them.
@@ -159,7 +165,9 @@ pub fn bootstrap(
     }
     // Residuals divided by one less their leverage need no factor for degrees of freedom.
     let lost = if leverages.is_some() { 0.0 } else { estimate.measurements as f64 - estimate.degrees_of_freedom() };
-    Ok(spread(estimate, &found, (begun, lost), seed))
+    let colored = estimate.warnings.iter().any(|warning| warning.code == WarningCode::ColoredErrors);
+    let single = matches!(resampling, Resampling::Residuals) && problem.layout().kind != Kind::Static;
+    Ok(Bootstrap { colored: colored && single, ..spread(estimate, &found, (begun, lost), seed) })
 }
 
 /// Scatter and percentiles of the refits that ended, of `tried` in all, of residuals that have lost so many degrees of freedom.
@@ -174,6 +182,7 @@ fn spread(estimate: &Summary, found: &[Vec<f64>], (tried, lost): (usize, f64), s
         bias: vec![],
         intervals: vec![],
         seed,
+        colored: false,
     };
     let n = found.len() as f64;
     for (i, unknown) in estimate.unknowns.iter().enumerate() {
@@ -294,7 +303,7 @@ fn signed(residuals: &[Vec<f64>], resampling: Resampling, random: &mut Random) -
 /// Standard errors, bias and intervals as a table.
 impl From<&Bootstrap> for Section {
     fn from(found: &Bootstrap) -> Section {
-        let Bootstrap { unknowns, converged, tried, standard_errors, bias, intervals, seed } = found;
+        let Bootstrap { unknowns, converged, tried, standard_errors, bias, intervals, seed, colored } = found;
         let row = |i: usize| {
             let (error, (lower, upper)) = (standard_errors[i], intervals[i]);
             let interval = format!("{} … {}", resolved(lower, error), resolved(upper, error));
@@ -304,7 +313,8 @@ impl From<&Bootstrap> for Section {
         let columns = ["unknown", "std. error", "bias", "95 % interval"];
         let table = Table::new("Refits of resampled records", columns).rows((0..rows).map(row));
         let text = format!("{converged} of {tried} refits ended; the seed {seed} makes the same again.");
-        Section::new("bootstrap", "Bootstrap").says(text).table(table.at_most(40))
+        let section = Section::new("bootstrap", "Bootstrap").says(text).table(table.at_most(40));
+        if *colored { section.because(Severity::UsableWithCare, SINGLE) } else { section }
     }
 }
 

@@ -140,8 +140,10 @@ pub enum WarningCode {
     NarrowLoss,
     /// Noise in the measured states from which predictions restart.
     RestartNoise,
-    /// Noise declared for the inputs, which biases the estimate.
+    /// Noise declared for the inputs, or of measurements that weights follow, which biases the estimate.
     InputNoise,
+    /// An input that acts a sample earlier or later than the record says, or behaves otherwise between its samples.
+    InputTiming,
     /// Unknowns that the data cannot tell apart.
     Unidentified,
     /// A finer step would move an unknown.

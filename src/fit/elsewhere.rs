@@ -189,7 +189,7 @@ impl Problem<'_> {
     }
 
     /// Whether several pieces of records like the first one run together in vector registers.
-    pub(super) fn runs_in_lanes(&self) -> bool {
+    pub(crate) fn runs_in_lanes(&self) -> bool {
         self.records.first().is_some_and(|first| self.sweep.lanes(first, self.unknowns.seeds(0)) > 1)
     }
 }

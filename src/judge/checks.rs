@@ -10,10 +10,12 @@ mod data_noise;
 mod declared;
 mod dropouts;
 mod errors;
+mod exchanged;
 mod explained;
 mod feedback;
 mod few;
 mod filter_order;
+mod input_timing;
 mod known;
 mod likelihood;
 mod missing_terms;
@@ -30,6 +32,7 @@ mod step;
 mod suspicions;
 #[cfg(test)]
 mod tests;
+mod weights;
 mod within_loss;
 
 pub(crate) use aliases::Aliases;
@@ -77,11 +80,13 @@ pub(crate) const CHECKS: &[Check] = &[
     declared::IDENTIFIED,
     step::STEP,
     filter_order::FILTER_ORDER,
+    input_timing::INPUT_TIMING,
     missing_terms::MISSING_TERMS,
     simulates::SIMULATES,
     aliases::ALIASES,
     search::MINIMUM,
     search::STARTS,
+    exchanged::EXCHANGED,
     search::CHECKPOINT,
     curved::CURVED,
     conditions::CONDITIONS,
@@ -91,6 +96,7 @@ pub(crate) const CHECKS: &[Check] = &[
     within_loss::LOSS,
     data_noise::RESTARTS,
     data_noise::INPUT_NOISE,
+    weights::WEIGHTS,
     errors::COLOR,
     errors::COUPLED,
     search::TIME,

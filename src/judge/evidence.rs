@@ -134,6 +134,9 @@ impl<'e> Evidence<'e> {
     /// powers of the prediction.
     pub fn compare_parts(&self) -> bool {
         let objective = self.point.objective;
+        if self.weighs_variances() {
+            return false;
+        }
         let examine = || {
             let least = self.residuals.shape.iter().copied().fold(self.residuals.parts, f64::min);
             let follow = least * (objective.outputs() as f64) < parts::LEVEL && !self.rounding;
@@ -143,6 +146,11 @@ impl<'e> Evidence<'e> {
             follow || unseen || self.is_colored() || always || apart()
         };
         *self.compare_parts.get_or_init(examine)
+    }
+
+    /// Whether predicted variances have weights: parts with others have no noise by which to compare them.
+    pub fn weighs_variances(&self) -> bool {
+        self.point.objective.is_weighted() && self.point.objective.sweep.predicts_variance()
     }
 
     /// The errors' autocorrelation; not computed where residuals are round-off.

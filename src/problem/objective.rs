@@ -181,7 +181,12 @@ impl<'p> Objective<'p> {
                 let (sample, output, variance) = (window.begin[0] + k, &outputs[j].name, window.variance(k, j, 0));
                 if window.is_measured(k, j, 0) && !(variance > 0.0 && variance.is_finite()) {
                     let signal = format!("the predicted variance of output `{output}`");
-                    first.get_or_insert((sample, signal, variance, if variance < 0.0 { NEGATIVE } else { NO_NOISE }));
+                    let hint = match variance {
+                        _ if variance < 0.0 => NEGATIVE,
+                        _ if variance.is_nan() => NO_NUMBER,
+                        _ => NO_NOISE,
+                    };
+                    first.get_or_insert((sample, signal, variance, hint));
                 }
                 let slopes = unknowns.iter().enumerate().map(|(column, name)| (name, window.at(k, j, column, 0)));
                 for (unknown, slope) in slopes.filter(|(_, slope)| !slope.is_finite()) {
@@ -223,6 +228,8 @@ const STEEP: &str = "; the value is finite but has no slope there (a root or a p
                      the model so that it is smooth there";
 const NO_NOISE: &str = "; it must be positive: write Model::noise, and keep the noise levels away \
                         from zero (with .log())";
+const NO_NUMBER: &str = "; it must be positive: write Model::noise; where it is written, the filtered state is where a root, a power or a logarithm of \
+                         the model has no value: limit it there (the larger of it and zero)";
 const NEGATIVE: &str = "; that is an error of the integrator: use a finer step (Fit::integrator)";
 const UNSOUND: &str = "; it is not a finite number: bound the parameters or start elsewhere";
 

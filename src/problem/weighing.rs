@@ -22,7 +22,7 @@ impl<'o> Weighing<'o> {
     /// Adds the cost of a standardized error; returns, for its row and for that of its variance, the factor of the
     /// slopes and the weighted error.
     #[inline]
-    pub(super) fn rows(&mut self, window: &Window, k: usize, j: usize, lane: usize) -> [(f64, f64); 2] {
+    pub(crate) fn rows(&mut self, window: &Window, k: usize, j: usize, lane: usize) -> [(f64, f64); 2] {
         let z = window.error(k, j, lane);
         let weight = if self.objective.is_weighted() {
             self.objective.weight(self.experiment, window.begin[lane] + k)

@@ -1,9 +1,8 @@
 //! The rows of each record in parts of equal length, output by output.
 
 use crate::information::{Gathering, Information};
-use crate::problem::{Accumulate, Objective};
+use crate::problem::{Accumulate, Objective, Weighing};
 use crate::sweep::Window;
-use std::f64::consts::FRAC_1_SQRT_2;
 
 /// Spans of equal length of each record.
 pub(crate) const SPANS: usize = 16;
@@ -24,6 +23,7 @@ pub(crate) type Spans = Vec<Vec<Span>>;
 pub(crate) struct SumSpans<'h> {
     objective: &'h Objective<'h>,
     experiment: usize,
+    weighing: Weighing<'h>,
     of: Vec<Vec<Span<Gathering>>>,
     row: Vec<f64>,
 }
@@ -38,7 +38,7 @@ impl<'h> SumSpans<'h> {
         let columns = objective.problem.unknowns.columns(experiment).count();
         let part = || Span { rows: Gathering::in_blocks(columns, ROWS), sums: [0.0; 3] };
         let of = (0..objective.outputs()).map(|_| (0..SPANS).map(|_| part()).collect()).collect();
-        SumSpans { objective, experiment, of, row: vec![0.0; columns] }
+        SumSpans { objective, experiment, weighing: Weighing::new(objective, experiment), of, row: vec![0.0; columns] }
     }
 
     pub fn complete(self) -> Spans {
@@ -55,19 +55,14 @@ impl Accumulate for SumSpans<'_> {
             let weight = self.objective.weight(self.experiment, window.begin[lane] + k);
             for j in (0..window.outputs()).filter(|&j| window.is_measured(k, j, lane) && weight > 0.0) {
                 let part = &mut self.of[j][number];
+                let [(root, error), (of_variance, second)] = self.weighing.rows(window, k, j, lane);
                 let values = window.row(k, j).iter().skip(lane).step_by(window.lanes());
-                let error = window.error(k, j, lane);
-                // As in iteratively reweighted least squares, whose minimum is that of the loss.
-                let by_loss = self.objective.loss().map_or(1.0, |loss| loss.weight(error));
-                let root = (weight * by_loss).sqrt();
                 self.row.iter_mut().zip(values).for_each(|(to, from)| *to = root * from);
-                let error = root * error;
                 part.sums.iter_mut().zip([error * error, error.powi(4), 1.0]).for_each(|(sum, one)| *sum += one);
                 part.rows.take(&self.row, error);
                 if window.has_variances() {
-                    let slope = |column: usize| window.variance_at(k, j, column, lane);
+                    let slope = |column: usize| of_variance * window.variance_at(k, j, column, lane);
                     self.row.iter_mut().enumerate().for_each(|(c, to)| *to = slope(c));
-                    let second = (error * error - 1.0) * FRAC_1_SQRT_2;
                     part.rows.take(&self.row, second);
                 }
             }

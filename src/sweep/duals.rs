@@ -231,7 +231,8 @@ impl Sweep for DualSweep<'_> {
     }
 
     fn with_terms<'s>(&'s self) -> Option<Lacking<'s>> {
-        let WithTerms { equations, terms, left_out } = self.code.equations()?.with_terms();
+        let equations = self.code.equations()?;
+        let WithTerms { equations, terms, left_out } = equations.with_terms(self.predictor.is_simulation());
         let (layout, code) = (Arc::new(equations.layout().clone()), Arc::new(Evaluated::new(Arc::new(equations))));
         let method = stepped(&self.method);
         let predictor = self.predictor.clone();

@@ -367,9 +367,9 @@ impl Sweep for ProgramSweep<'_> {
 
     fn with_terms<'s>(&'s self) -> Option<Lacking<'s>> {
         let make = || {
-            let WithTerms { equations, terms, left_out } = self.programs.equations.with_terms();
-            let method = stepped(&self.programs.method);
-            let sweep = of_equations(&Arc::new(equations), &method, &self.programs.predictor).ok()?;
+            let Programs { equations, method, predictor, .. } = &*self.programs;
+            let WithTerms { equations, terms, left_out } = equations.with_terms(predictor.is_simulation());
+            let sweep = of_equations(&Arc::new(equations), &stepped(method), predictor).ok()?;
             Some(Lacking { sweep, terms, left_out })
         };
         self.programs.lacking.get_or_init(make).clone()

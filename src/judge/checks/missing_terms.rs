@@ -1,34 +1,43 @@
-//! Whether what a filter takes for process noise follows from the state or the inputs.
+//! Whether an equation lacks a term in the state or the inputs: what a filter takes for process noise, a simulation for noise of measurements.
 
 use super::*;
 use crate::parameter::free;
-use crate::problem::{Free, Noise, Problem};
-use crate::sweep::Sweep;
+use crate::problem::{Accumulate, Free, Problem};
+use crate::sweep::{Sweep, Window};
 use statrs::distribution::{ContinuousCDF, Normal};
 use std::collections::HashMap;
 use std::sync::Arc;
 
 pub(crate) const MISSING_TERMS: Check = Check::new(
-    "disturbances follow from nothing that is known",
-    "Of a filter: does the likelihood ask for a term in the derivative (next state) that process noise acts on: a constant, a state, an input, their \
-     squares or cubes (score tests, Rao 1948, beside all unknowns)? By how many standard errors would an unknown move with it?",
+    "equations lack no term",
+    "Does the likelihood ask for a term in a derivative (next state): a constant, a state, an input, their squares or cubes, in a simulation their \
+     signs (score tests, Rao 1948, beside all unknowns)? Of a filter in what process noise acts on; of a simulation where a parameter stands (32 terms at \
+     the most), if its errors are correlated over time or with the prediction, or few. By how many standard errors would an unknown move with it?",
     &[WarningCode::MissingTerm],
     missing_terms,
 )
-.costs(&[Pass::Slopes(1)])
+.costs(&[Pass::Slopes(2)])
 .levels(&[
+    level("chance of such a correlation of a simulation's errors", REASON, "a tenth: the pass has many columns"),
+    level("measurements of a simulation that need no such reason", SHORT as f64, "a pass takes a millisecond"),
     level("the states of a model that is examined", MOST as f64, "the slopes of a covariance grow by the third power"),
     level("chance of the largest of the terms", LEVEL, "one good record in a thousand"),
     level("chance of one that moves an unknown by two standard errors, from which on care is needed", LIKELY, "one in a hundred"),
     level("standard errors from which on care is needed", CARE, "half of one: intervals of 95 % then cover 92 %"),
     level("standard errors from which on intervals mean nothing", FAR, "two: they cover half"),
+    level("the part of an unknown of a simulation that has to move, too", PART, "a quarter"),
 ]);
+
+const REASON: f64 = 0.1;
+/// Records of up to so many measurements are examined in any case: other tests see little there, and a pass costs little.
+const SHORT: u64 = 1_000;
 
 const MOST: usize = 6;
 const LEVEL: f64 = 1e-3;
 const LIKELY: f64 = 1e-2;
 const CARE: f64 = 0.5;
 const FAR: f64 = 2.0;
+const PART: f64 = 0.25;
 /// Where the slopes of all unknowns explain those of a term but for this part or less, the data do not tell the two apart.
 const SAME: f64 = 1e-4;
 
@@ -43,13 +52,17 @@ struct Asked {
     /// The largest move of an unknown, in its standard errors, and which.
     moved: f64,
     unknown: usize,
+    /// By which part of itself it moves.
+    part: f64,
+    /// By how much each unknown moves beside a factor of one.
+    beside: Vec<f64>,
 }
 
 impl Asked {
     /// What it means, beside so many others.
-    fn severity(&self, terms: usize) -> Severity {
+    fn severity(&self, terms: usize, filtered: bool) -> Severity {
         match 2.0 * Normal::standard().sf(self.errors) * terms as f64 {
-            ..LEVEL if self.moved >= FAR => Severity::NotUsable,
+            ..LEVEL if self.moved >= FAR && (filtered || self.part >= PART) => Severity::NotUsable,
             ..LEVEL if self.moved >= CARE => Severity::UsableWithCare,
             ..LIKELY if self.moved >= FAR => Severity::UsableWithCare,
             _ => Severity::Usable,
@@ -59,12 +72,21 @@ impl Asked {
 
 fn missing_terms(evidence: &Evidence<'_>, intervals: &Intervals) -> Examined {
     let objective = evidence.point.objective;
-    if !objective.sweep.predicts_variance() {
+    let (states, filtered) = (&objective.problem.layout().states, objective.sweep.predicts_variance());
+    if states.is_empty() || objective.sweep.restarts().is_some() {
         return Examined::from(None);
     }
-    let states = &objective.problem.layout().states;
+    if !filtered && let Some(reason) = evidence.ruled_out(OF_SIMULATIONS) {
+        return Examined::from(None).without(Some(reason));
+    }
+    if !filtered && evidence.residuals.measured > SHORT && !gives_reason(evidence) {
+        return Examined::from(None);
+    }
     if states.len() > MOST {
         return Examined::from(None).without(Some("models of more than 6 states"));
+    }
+    if !filtered && !objective.problem.runs_in_lanes() {
+        return Examined::from(None).without(Some("simulations that are not run as programs of fixed steps"));
     }
     let Some(made) = objective.sweep.with_terms() else {
         return Examined::from(None).without(Some("models that are not read as a graph"));
@@ -80,23 +102,38 @@ fn missing_terms(evidence: &Evidence<'_>, intervals: &Intervals) -> Examined {
     let Some(asked) = asked(evidence, intervals, made.sweep, count) else {
         return Examined::from(None).without(Some("models that take more than four steps per sample"));
     };
-    let asked = asked.into_iter().map(|asked| (asked.severity(count), asked));
+    let asked = asked.into_iter().map(|asked| (asked.severity(count, filtered), asked));
     let told = asked.filter(|(severity, _)| *severity > Severity::Usable);
     let worst = told.max_by(|(a, one), (b, other)| a.cmp(b).then(one.errors.total_cmp(&other.errors)));
     let warning = worst.map(|(severity, asked)| {
         let term = &made.terms[asked.term];
+        let (state, by, compare) = match filtered {
+            true => ("what is taken for process noise of `", "follows", ", or compare with a simulation"),
+            false => ("the errors ask for another term in the equation of `", "which follows", ""),
+        };
         let text = format!(
-            "what is taken for process noise of `{}` follows {} ({} standard errors): its equation may lack such a term, with which `{}` would \
-             change by {} standard errors; write the term into the model, with a parameter, or compare with a simulation",
+            "{state}{}` {by} {} ({} standard errors): its equation may lack such a term, with which `{}` would change by {} standard errors \
+             ({}); write the term into the model, with a parameter{compare}",
             states[term.state].name,
             term.what,
             number(asked.errors, 2),
             intervals.unknowns[asked.unknown].name,
-            number(asked.moved, 2)
+            number(asked.moved, 2),
+            percent(asked.part, 2)
         );
         Warning::new(WarningCode::MissingTerm, severity, text).about(About::Unknown(asked.unknown))
     });
-    Examined::from(warning).without(left_out)
+    Examined::from(warning).without(left_out.filter(|_| filtered))
+}
+
+/// What rules out a simulation.
+const OF_SIMULATIONS: &[Unless] = &[Unless::RoundOff, Unless::Prefilter, Unless::Weighed, Unless::NoMinimum];
+
+/// Whether the errors of a simulation may be correlated with the prediction, or over time.
+fn gives_reason(evidence: &Evidence<'_>) -> bool {
+    let (residuals, outputs) = (&evidence.residuals, evidence.point.objective.outputs() as f64);
+    let follows = residuals.shape.iter().any(|chance| chance * outputs < REASON);
+    follows || evidence.autocorrelated_at(REASON).is_some()
 }
 
 /// What the likelihood says of each term that is told from the unknowns; `None` where it cannot be evaluated with these terms.
@@ -110,7 +147,7 @@ fn asked(
     let of = objective.problem;
     let first = of.parameters().len();
     let parameters: Vec<_> = of.parameters().iter().copied().chain((0..terms).map(|_| free(0.0))).collect();
-    let settings = of.settings.beside(Noise::Predicted);
+    let settings = of.settings.beside(of.settings.noise.clone());
     let problem = Problem::new(sweep, of.records.clone(), &parameters, settings).ok()?;
     // Each unknown of the fit is one of this problem, too; the factors of the terms are zero.
     let key = |free: &Free| (free.role, free.experiment);
@@ -118,14 +155,16 @@ fn asked(
     let row = &problem.unknowns.row;
     let from: Vec<Option<usize>> = row.iter().map(|free| known.get(&key(free)).copied()).collect();
     let coordinates: Vec<f64> = from.iter().map(|i| i.map_or(0.0, |i| evidence.point.end.coordinates[i])).collect();
-    let linear = problem.in_units(objective.control).evaluate(&coordinates).ok()?;
-    let same = (linear.cost - evidence.point.linear.cost).abs() <= STEPPED;
+    let linear = objective.of(&problem, &*problem.sweep).evaluate(&coordinates).ok()?;
+    let widening = evidence.point.widening;
+    let same = (linear.cost - evidence.point.linear.cost).abs() <= STEPPED * widening * widening;
     if !same {
         return None;
     }
     let known = |i: usize| intervals.unknowns[i].knowledge.standard_error();
     let held: Vec<bool> = from.iter().map(|i| i.is_none_or(|i| known(i).is_none())).collect();
     let norms = linear.column_norms();
+    let without = linear.step(&vec![0.0; row.len()], &held)?;
     let ask = |at: usize| {
         let Role::Parameter(number) = row[at].role else { return None };
         let mut held = held.clone();
@@ -139,11 +178,76 @@ fn asked(
         let moved = |(j, i): (usize, &Option<usize>)| {
             let unknown = &intervals.unknowns[(*i)?];
             let change = (step[j] * unknown.transform.slope(unknown.value)).abs();
-            Some((change / unknown.knowledge.standard_error()?, (*i)?))
+            Some((change / unknown.knowledge.standard_error()?, (*i)?, change / unknown.value.abs()))
         };
-        let (moved, unknown) = from.iter().enumerate().filter_map(moved).max_by(|a, b| a.0.total_cmp(&b.0))?;
-        Some(Asked { term: number.checked_sub(first)?, errors: (step[at] / error).abs(), moved, unknown })
+        let (moved, unknown, part) = from.iter().enumerate().filter_map(moved).max_by(|a, b| a.0.total_cmp(&b.0))?;
+        Some(Asked {
+            term: number.checked_sub(first)?,
+            errors: (step[at] / (error * widening)).abs(),
+            moved,
+            unknown,
+            part,
+            beside: step.iter().zip(&without).map(|(with, without)| (with - without) / step[at]).collect(),
+        })
     };
     let asked = (0..row.len()).filter(|at| from[*at].is_none()).filter_map(ask);
-    Some(asked.filter(|asked| asked.errors.is_finite() && asked.moved.is_finite()).collect())
+    let asked = asked.filter(|asked| asked.errors.is_finite() && asked.moved.is_finite());
+    if evidence.point.objective.sweep.predicts_variance() {
+        return Some(asked.collect());
+    }
+    let told = asked.filter(|asked| asked.severity(terms, false) > Severity::Usable).collect();
+    by_sizes(evidence, &objective.of(&problem, &*problem.sweep), &coordinates, told)
+}
+
+/// Terms of a simulation with fewer standard errors where its errors are larger where the term acts (White, Econometrica 48 (1980) 817), or
+/// colored; by one more pass with slopes where there are such terms.
+fn by_sizes(
+    evidence: &Evidence<'_>,
+    objective: &Objective<'_>,
+    coordinates: &[f64],
+    mut told: Vec<Asked>,
+) -> Option<Vec<Asked>> {
+    if told.is_empty() {
+        return Some(told);
+    }
+    let of = |e: usize, beside: &[f64]| objective.problem.unknowns.columns(e).map(|i| beside[i]).collect();
+    let make = |e: usize| Sizes { of: told.iter().map(|one| (of(e, &one.beside), [0.0; 4])).collect() };
+    let mut all = objective.gather(coordinates, true, make).ok()?.into_iter();
+    let mut sums = all.next()?;
+    all.for_each(|one| sums.append(one));
+    let inflation = evidence.residuals.whiteness.iter().map(|white| white.variance_inflation).fold(1.0, f64::max);
+    let inflation = if evidence.uses_hac() { inflation } else { 1.0 };
+    for (asked, (_, [products, squares, errors, count])) in told.iter_mut().zip(sums.of) {
+        let larger = products * count / (squares * errors);
+        asked.errors /= (larger.max(1.0) * inflation).sqrt();
+    }
+    Some(told)
+}
+
+/// For each term its columns' factors that leave what is orthogonal to the unknowns, `z`, and the sums of `e^2 z^2`, `z^2` and `e^2` of the errors
+/// `e`, and of one.
+struct Sizes {
+    of: Vec<(Vec<f64>, [f64; 4])>,
+}
+
+impl Accumulate for Sizes {
+    fn add(&mut self, window: &Window, lane: usize) {
+        for (k, j) in (0..window.samples[lane]).flat_map(|k| (0..window.outputs()).map(move |j| (k, j))) {
+            if !window.is_measured(k, j, lane) {
+                continue;
+            }
+            let error = window.error(k, j, lane).powi(2);
+            for (factors, sums) in &mut self.of {
+                let z: f64 = factors.iter().enumerate().map(|(c, factor)| factor * window.at(k, j, c, lane)).sum();
+                let terms = [error * z * z, z * z, error, 1.0];
+                sums.iter_mut().zip(terms).for_each(|(sum, term)| *sum += term);
+            }
+        }
+    }
+
+    fn append(&mut self, later: Self) {
+        for ((_, sums), (_, later)) in self.of.iter_mut().zip(later.of) {
+            sums.iter_mut().zip(later).for_each(|(sum, later)| *sum += later);
+        }
+    }
 }

@@ -4,6 +4,7 @@ use super::*;
 use crate::judge::checks::dropouts;
 use crate::judge::checks::suspicions::is_named;
 use crate::outliers::{center_and_deviation, hampel};
+use crate::problem::Free;
 use crate::residuals::first_errors::{self, Errors};
 use crate::residuals::largest::chance;
 
@@ -11,15 +12,19 @@ pub(crate) const OUTLIERS: Check = Check::new(
     "no error is far beyond the others",
     "Where the kurtosis is that of heavy tails: do errors far from all and from their neighbors make a part of \
      the sum of squares (Hampel's test), or were values held where none arrived? Else: is the largest error no \
-     chance among normal ones (Grubbs 1950)?",
+     chance among normal ones (Grubbs 1950)? With a loss, where noise levels are estimated beside it.",
     &[WarningCode::Outliers, WarningCode::Frozen],
     |evidence, _| {
         let without =
-            heavy(evidence).contains(&true).then(|| first_errors::left_out(evidence.point.objective)).flatten();
-        Examined::from(outliers(evidence)).without(without)
+            || heavy(evidence).contains(&true).then(|| first_errors::left_out(evidence.point.objective)).flatten();
+        match evidence.ruled_out(&[Unless::Weighed]) {
+            None => Examined::from(outliers(evidence)).without(without()),
+            Some(_) if levels_follow(evidence) => Examined::from(beside_levels(evidence)).without(without()),
+            reason => Examined::from(None).without(reason),
+        }
     },
 )
-.unless(&[Unless::Weighed, Unless::RoundOff])
+.unless(&[Unless::RoundOff])
 .levels(&[
     level("the kurtosis, in its standard deviations", HEAVY, "one in two million"),
     level("robust standard deviations of an outlier", FAR, "one in two million normal errors"),
@@ -61,6 +66,34 @@ fn outliers(evidence: &Evidence<'_>) -> Vec<Warning> {
     };
     let heavy = |j: usize| if heavy[j] { of(j) } else { None };
     (0..objective.outputs()).filter_map(|j| heavy(j).or_else(|| extreme(evidence, j))).collect()
+}
+
+/// Whether a loss reduces the weight of errors by which noise levels are estimated, too.
+fn levels_follow(evidence: &Evidence<'_>) -> bool {
+    let objective = evidence.point.objective;
+    let levels = objective.sweep.levels();
+    let is_level = |free: &Free| matches!(free.role, Role::Parameter(place) if levels.contains(&place));
+    objective.is_robust() && !objective.is_weighted() && objective.problem.unknowns.row.iter().any(is_level)
+}
+
+/// Outliers of a filter with a robust loss. The likelihood takes what is left of them as noise, and the gain of the filter follows from it.
+fn beside_levels(evidence: &Evidence<'_>) -> Vec<Warning> {
+    let heavy = heavy(evidence);
+    let of = |j: usize| {
+        let errors = unsuspected(evidence, j, &evidence.residuals.standardized_errors).into_iter().flatten();
+        let errors: Vec<f64> = errors.filter(|error| !error.is_nan()).collect();
+        let (count, share) = far_errors(&errors).filter(|(_, share)| *share > DECIDE)?;
+        let text = format!(
+            "{} of the errors of `{}` are beyond {FAR} robust standard deviations, of all and of their neighbors, and make {} of the sum of squares: \
+             the loss keeps them from the state, but noise levels and with them all intervals still follow from them; mark these samples as \
+             missing, or give the noise levels",
+            percent(count as f64 / errors.len() as f64, 2),
+            evidence.point.objective.problem.layout().outputs[j].name,
+            percent(share, 2)
+        );
+        Some(with_care(WarningCode::Outliers, text).about(About::Output(j)))
+    };
+    (0..heavy.len()).filter(|j| heavy[*j]).filter_map(of).collect()
 }
 
 /// The first errors of an output, record by record, without those of samples that the look at its column names.

@@ -33,6 +33,9 @@ const FAR_APART: f64 = 0.25;
 
 /// Which parts are not compared though others are.
 fn left_out(evidence: &Evidence<'_>) -> Option<&'static str> {
+    if evidence.weighs_variances() {
+        return Some("parts of predicted variances with weights");
+    }
     let many = evidence.point.objective.experiments() > COMPARED;
     (many && evidence.compare_parts()).then_some("pairs of records, of which there are more than 100")
 }

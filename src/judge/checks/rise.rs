@@ -65,7 +65,7 @@ fn rise(evidence: &Evidence<'_>, at: Place, covariances: &Covariances) -> Option
 }
 
 /// A place along a step where the cost is lower.
-fn lower(objective: &Objective<'_>, from: &[f64], cost: f64, step: &[f64]) -> Option<Vec<f64>> {
+pub(super) fn lower(objective: &Objective<'_>, from: &[f64], cost: f64, step: &[f64]) -> Option<Vec<f64>> {
     let places = PARTS.into_iter().map(|part| moved(from, step, part));
     let is_lower = |place: &Vec<f64>| is_inside(objective, place) && objective.cost_at(place).is_ok_and(|at| at < cost);
     places.into_iter().find(is_lower)
@@ -75,6 +75,6 @@ fn moved(from: &[f64], step: &[f64], part: f64) -> Vec<f64> {
     from.iter().zip(step).map(|(x, step)| x + part * step).collect()
 }
 
-fn is_inside(objective: &Objective<'_>, place: &[f64]) -> bool {
+pub(super) fn is_inside(objective: &Objective<'_>, place: &[f64]) -> bool {
     objective.problem.unknowns.bounds().iter().zip(place).all(|((lower, upper), x)| (*lower..=*upper).contains(x))
 }
