@@ -12,14 +12,14 @@ pub(crate) const MISSING_TERMS: Check = Check::new(
     "equations lack no term",
     "Does the likelihood ask for a term in a derivative (next state): a constant, a state, an input, their squares or cubes, in a simulation their \
      signs (score tests, Rao 1948, beside all unknowns)? Of a filter in what process noise acts on; of a simulation where a parameter stands (32 terms at \
-     the most), if its errors are correlated over time or with the prediction, or few. By how many standard errors would an unknown move with it?",
+     the most), if its errors are correlated over time or with the prediction. By how many standard errors would an unknown move with it?",
     &[WarningCode::MissingTerm],
     missing_terms,
 )
 .costs(&[Pass::Slopes(2)])
 .levels(&[
     level("chance of such a correlation of a simulation's errors", REASON, "a tenth: the pass has many columns"),
-    level("measurements of a simulation that need no such reason", SHORT as f64, "a pass takes a millisecond"),
+    level("the same of up to 1,000 measurements", REASON_OF_SHORT, "other tests see less there, and the pass takes a millisecond"),
     level("the states of a model that is examined", MOST as f64, "the slopes of a covariance grow by the third power"),
     level("chance of the largest of the terms", LEVEL, "one good record in a thousand"),
     level("chance of one that moves an unknown by two standard errors, from which on care is needed", LIKELY, "one in a hundred"),
@@ -29,8 +29,9 @@ pub(crate) const MISSING_TERMS: Check = Check::new(
 ]);
 
 const REASON: f64 = 0.1;
-/// Records of up to so many measurements are examined in any case: other tests see little there, and a pass costs little.
+/// Up to so many measurements are few.
 const SHORT: u64 = 1_000;
+const REASON_OF_SHORT: f64 = 0.3;
 
 const MOST: usize = 6;
 const LEVEL: f64 = 1e-3;
@@ -79,7 +80,7 @@ fn missing_terms(evidence: &Evidence<'_>, intervals: &Intervals) -> Examined {
     if !filtered && let Some(reason) = evidence.ruled_out(OF_SIMULATIONS) {
         return Examined::from(None).without(Some(reason));
     }
-    if !filtered && evidence.residuals.measured > SHORT && !gives_reason(evidence) {
+    if !filtered && !gives_reason(evidence) {
         return Examined::from(None);
     }
     if states.len() > MOST {
@@ -132,8 +133,9 @@ const OF_SIMULATIONS: &[Unless] = &[Unless::RoundOff, Unless::Prefilter, Unless:
 /// Whether the errors of a simulation may be correlated with the prediction, or over time.
 fn gives_reason(evidence: &Evidence<'_>) -> bool {
     let (residuals, outputs) = (&evidence.residuals, evidence.point.objective.outputs() as f64);
-    let follows = residuals.shape.iter().any(|chance| chance * outputs < REASON);
-    follows || evidence.autocorrelated_at(REASON).is_some()
+    let reason = if residuals.measured > SHORT { REASON } else { REASON_OF_SHORT };
+    let follows = residuals.shape.iter().any(|chance| chance * outputs < reason);
+    follows || evidence.autocorrelated_at(reason).is_some()
 }
 
 /// What the likelihood says of each term that is told from the unknowns; `None` where it cannot be evaluated with these terms.
