@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from typing import Any, TypeAlias
 
 from greybox.errors import Error
@@ -25,6 +26,8 @@ class Bootstrap:
         Refits begun, fewer than asked for where a time limit ended them, and those that ended; the others are left out.
     seed : int
         The seed that makes the same again.
+    colored : bool
+        Whether single residuals were drawn although they are colored: the intervals are too narrow.
     """
 
     def __init__(self, unknowns: list[str], values: list[float], seed: int, kind: Kind, found: Found) -> None:
@@ -33,6 +36,7 @@ class Bootstrap:
         self._values = values
         self._kind = kind
         self._errors, self._bias, self._intervals, self.tried, self.converged, self._json = found
+        self.colored: bool = json.loads(self._json)["colored"]
 
     def interval(self, name: str) -> tuple[float, float]:
         """Give the 95 % interval of an unknown: percentiles of the refits, stretched for the degrees of freedom that residuals have lost.

@@ -252,7 +252,7 @@ class Fit(Estimate):
         if made.tried < count:
             text = f"the time limit ended the bootstrap after {made.tried} of {count} refits: the intervals are of these"
             warn(FitWarning("bootstrap_ended", "usable", text))
-        if blocks is None and any(warning.code == "colored_errors" for warning in self.warnings):
+        if made.colored:
             text = "the errors are colored, and single residuals were drawn: the intervals are too narrow; draw blocks=0 or more"
             warn(FitWarning("colored_errors", "usable_with_care", text))
         return made

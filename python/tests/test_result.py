@@ -123,9 +123,21 @@ def test_profiles(fitted: gb.Fit) -> None:
         fitted.profile("r")
 
 
+def test_single_residuals_of_colored_errors_are_warned_of() -> None:
+    record = cooled()
+    noise = np.random.default_rng(2).normal(0.0, 1.0, 200)
+    for i in range(1, 200):
+        noise[i] += 0.9 * noise[i - 1]
+    with pytest.warns(gb.FitWarning, match="are not white"):
+        fit = gb.fit(cooling(), {**record, "body": record["body"] + 0.2 * noise}, k=gb.free(1.0))
+    with pytest.warns(gb.FitWarning, match=r"\[colored_errors\].*single residuals"):
+        assert fit.bootstrap(20).colored
+    assert not fit.bootstrap(20, blocks=0).colored
+
+
 def test_bootstrap(fitted: gb.Fit, tmp_path: Path) -> None:
     drawn = fitted.bootstrap(200, seed=3)
-    assert drawn.unknowns == fitted.unknowns and drawn.converged == drawn.tried == 200
+    assert drawn.unknowns == fitted.unknowns and drawn.converged == drawn.tried == 200 and not drawn.colored
     for name in ("rs", "ls", "ke"):
         # The standard deviation of 200 draws is known to 5 %; four times that.
         assert drawn.standard_error(name) == pytest.approx(fitted.standard_errors[name], rel=0.2)

@@ -206,6 +206,11 @@ impl<'e> Evidence<'e> {
         if self.point.is_static() { 1.0 } else { self.residuals.whiteness[j].variance_inflation }
     }
 
+    /// The same of the output whose errors are correlated most.
+    pub fn most_inflation(&self) -> f64 {
+        (0..self.residuals.whiteness.len()).map(|j| self.variance_inflation(j)).fold(1.0, f64::max)
+    }
+
     /// How many independent errors an output has the information of, one at least.
     pub fn independent(&self, j: usize) -> f64 {
         self.residuals.outputs[j].samples.max(1) as f64 / self.variance_inflation(j)

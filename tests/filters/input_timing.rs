@@ -123,3 +123,59 @@ fn right_inputs_are_not() {
         assert!(said(&found).is_none(), "{seed} {gain}: {:?}", said(&found));
     }
 }
+
+signals! { pub struct Lags { x: "m", z: "m" } }
+signals! { pub struct Inverse { a: "1/s", b: "1/s", q: "m/s^0.5", r: "m" } }
+
+/// Two lags of one flow, of which 1.5 of the slow one and -0.7 of the fast one are measured: the output begins in the wrong direction.
+#[derive(Clone)]
+struct WrongWay;
+
+impl Model for WrongWay {
+    type State = Lags;
+    type Input = Flow;
+    type Output = Level;
+    type Parameters = Inverse;
+
+    fn derivative<S: Scalar>(&self, _t: S, x: &Lags<S>, u: &Flow<S>, p: &Inverse<S>) -> Lags<S> {
+        Lags { x: p.a * (u.u - x.x), z: p.b * (u.u - x.z) }
+    }
+
+    fn output<S: Scalar>(&self, _t: S, x: &Lags<S>, _u: &Flow<S>, _p: &Inverse<S>) -> Level<S> {
+        Level { x: x.z * 1.5 - x.x * 0.7 }
+    }
+
+    fn diffusion<S: Scalar>(&self, _t: S, _x: &Lags<S>, _u: &Flow<S>, p: &Inverse<S>) -> Lags<S> {
+        Lags { x: p.q, z: p.q }
+    }
+
+    fn noise<S: Scalar>(&self, _t: S, _x: &Lags<S>, _u: &Flow<S>, p: &Inverse<S>) -> Level<S> {
+        Level { x: p.r }
+    }
+}
+
+/// In a loop its input acts with the measurement that it is computed from, as one that is recorded late does. Such a right record is not refused.
+#[test]
+fn an_inverse_response_in_a_loop_is_not_refused() {
+    for seed in 1..=4 {
+        let mut random = Noise(seed);
+        let (mut x, mut reference, mut inputs, mut outputs) = ([0.0f64; 2], 0.0, vec![], vec![]);
+        for k in 0..SAMPLES {
+            reference = if k % 15 == 0 { random.gauss() } else { reference };
+            let y = 1.5 * x[1] - 0.7 * x[0] + R * random.gauss();
+            let u = reference - y;
+            inputs.push(Flow { u });
+            outputs.push(Level { x: y });
+            for _ in 0..FINE {
+                let h = STEP / FINE as f64;
+                let steps = [2.0 * (u - x[0]), 0.5 * (u - x[1])];
+                x = [0, 1].map(|i| x[i] + h * steps[i] + Q * h.sqrt() * random.gauss());
+            }
+        }
+        let record = Experiment::new(&WrongWay, Time::Uniform { start: 0.0, step: STEP }, inputs, outputs).unwrap();
+        let record = record.hold(Hold::Zero).initial(Lags { x: fixed(0.0), z: fixed(0.0) });
+        let start = Inverse { a: free(1.5), b: free(0.7), q: free(0.3).log(), r: free(0.1).log() };
+        let found = Fit::new(&WrongWay, &record).parameters(start).predictor(Kalman).run().unwrap();
+        assert!(found.severity() < Severity::NotUsable, "{seed}: {found}");
+    }
+}

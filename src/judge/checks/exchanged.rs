@@ -1,6 +1,6 @@
 //! Two parameters of one unit whose values may be exchanged: two lags in series, absorption and elimination.
 //!
-//! The data tell such a model's parameters apart only in pairs, and by slopes at one minimum that cannot be seen.
+//! The cost has two minima then, at which the data are explained alike. The slopes at one of them do not show the other.
 
 use super::rise::{is_inside, lower};
 use super::search::INDISTINGUISHABLE;
@@ -30,7 +30,7 @@ pub(crate) const EXCHANGED: Check = Check::new(
 
 const MOST: usize = 6;
 const APART: f64 = 2.0 * INDISTINGUISHABLE;
-/// Steps of the other unknowns at the most, and the part of the difference that one must promise.
+/// Steps of the other unknowns at the most, and the part of the difference in cost that the next one has to gain.
 const STEPS: usize = 8;
 const SETTLED: f64 = 0.05;
 
@@ -39,7 +39,7 @@ fn left_out(evidence: &Evidence<'_>) -> Option<&'static str> {
     (pairs(evidence).count() > MOST).then_some("further pairs of parameters of one unit")
 }
 
-/// Pairs of parameters of all records that may have each other's value, which is far from their own.
+/// Pairs of parameters that all records share, of which each may have the other's value, by unit and bounds, and is known to differ from it.
 fn pairs<'e>(evidence: &'e Evidence<'_>) -> impl Iterator<Item = (usize, usize)> + use<'e> {
     let (point, unknowns) = (&evidence.point, &evidence.point.objective.problem.unknowns);
     let units = &evidence.point.objective.problem.layout().parameters;
@@ -61,7 +61,7 @@ fn pairs<'e>(evidence: &'e Evidence<'_>) -> impl Iterator<Item = (usize, usize)>
     (0..unknowns.shared()).flat_map(|j| (0..j).map(move |i| (i, j))).filter(can)
 }
 
-/// The coordinates of two unknowns with each other's value, less their own.
+/// The changes of the coordinates of two unknowns when their values are exchanged.
 fn exchange(evidence: &Evidence<'_>, i: usize, j: usize) -> [f64; 2] {
     let to = |i: usize, j: usize| {
         let transform = evidence.point.objective.problem.unknowns.row[i].parameter.transform;

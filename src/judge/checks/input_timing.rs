@@ -2,9 +2,11 @@
 //!
 //! Predictions that are corrected by measurements take such a fault as process noise: their errors stay white, and the likelihood alone is
 //! lower. Each input is tried a sample earlier, a sample later, and with the other hold, the unknowns being those of the estimate. A wrong
-//! model is more likely than the right one by a factor `l` with a probability of at most `1 / l` (Markov's inequality), in a closed loop too,
-//! where an input a sample earlier follows from the measurement that is predicted: a controller acts against the errors, an input with them.
+//! model is more likely than the right one by a factor `l` with a probability of at most `1 / l` (Markov's inequality). That does not hold where
+//! the value of the next sample is taken and a controller has computed it from the measurement that is predicted. Most controllers make such a
+//! record less likely, but not all: an inverse response in a loop makes it more likely, so that no estimate is refused for that.
 
+use super::step::{Shift, of_one};
 use super::*;
 use crate::interval::Hold;
 use crate::layout::Kind;
@@ -23,7 +25,7 @@ pub(crate) const INPUT_TIMING: Check = Check::new(
 .levels(&[
     level("the probability by chance, over all that is tried", LEVEL, "at most one good record in a thousand"),
     level("the move of a parameter of care, in standard errors", CARE, "half of one: intervals of 95 % then cover 92 %"),
-    level("the part of a parameter that is not usable", FAR, "a quarter"),
+    level("the part of a parameter that is not usable, where no value of the next sample is taken", FAR, "a quarter"),
     level("the inputs of a model that is examined", MOST as f64, "each takes three passes"),
 ]);
 
@@ -40,7 +42,7 @@ enum Otherwise {
     OtherHold,
 }
 
-/// Inputs that act otherwise, and the logarithm of the factor by which the record is more likely so.
+/// Inputs that act otherwise, with the records, and the logarithm of the factor by which these are more likely.
 struct Found<'p> {
     inputs: Vec<usize>,
     otherwise: Otherwise,
@@ -48,7 +50,7 @@ struct Found<'p> {
     log_likelihood: f64,
 }
 
-/// What makes the record more likely than any other fault does.
+/// The fault with which the record is most likely.
 fn input_timing(evidence: &Evidence<'_>, intervals: &Intervals) -> Examined {
     let objective = evidence.point.objective;
     let (problem, inputs) = (objective.problem, objective.problem.layout().inputs.len());
@@ -74,14 +76,14 @@ fn input_timing(evidence: &Evidence<'_>, intervals: &Intervals) -> Examined {
     Examined::from(certain.map(|found| warning(evidence, found, &intervals.unknowns)))
 }
 
-/// With fewer errors where they are colored; `None` where there are no predictions.
+/// The log-likelihood counts the errors by how many independent ones they tell as much as. `None` where nothing can be predicted.
 fn found<'p>(evidence: &Evidence<'p>, inputs: Vec<usize>, otherwise: Otherwise) -> Option<Found<'p>> {
     let objective = evidence.point.objective;
     let records = objective.problem.records.iter().map(|record| with(record, &inputs, otherwise)).collect();
     let problem = objective.problem.with_records(records).ok()?;
     let cost = objective.of(&problem, objective.sweep).cost_at(&evidence.point.end.coordinates).ok()?;
-    let inflation = evidence.residuals.whiteness.iter().map(|white| white.variance_inflation).fold(1.0, f64::max);
-    let log_likelihood = (evidence.point.linear.cost - cost) / inflation;
+    let variance = evidence.point.widening.powi(2) * evidence.most_inflation();
+    let log_likelihood = (evidence.point.linear.cost - cost) / variance;
     Some(Found { inputs, otherwise, problem, log_likelihood })
 }
 
@@ -96,23 +98,25 @@ fn warning(evidence: &Evidence<'_>, found: Found<'_>, unknowns: &[Unknown]) -> W
         (Otherwise::Earlier, true) => ("act a sample before they are recorded", EARLIER),
         (Otherwise::Later, false) => ("acts a sample after it is recorded", LATER),
         (Otherwise::Later, true) => ("act a sample after they are recorded", LATER),
-        (Otherwise::OtherHold, false) if held => ("is a straight line between its samples rather than held", HOLD),
-        (Otherwise::OtherHold, true) if held => ("are straight lines between their samples rather than held", HOLD),
-        (Otherwise::OtherHold, false) => ("is held between its samples rather than a straight line", HOLD),
-        (Otherwise::OtherHold, true) => ("are held between their samples rather than straight lines", HOLD),
+        (Otherwise::OtherHold, false) if held => ("is a straight line between its samples rather than held", LINE),
+        (Otherwise::OtherHold, true) if held => ("are straight lines between their samples rather than held", LINE),
+        (Otherwise::OtherHold, false) => ("is held between its samples rather than a straight line", HELD),
+        (Otherwise::OtherHold, true) => ("are held between their samples rather than straight lines", HELD),
     };
-    let furthest = furthest(evidence, &objective.of(&found.problem, objective.sweep), unknowns);
-    let (severity, moved) = match furthest {
-        Some((name, part, errors)) => {
-            let severity = match (part > FAR && errors > CARE, errors > CARE) {
-                (true, _) => Severity::NotUsable,
-                (_, true) => Severity::UsableWithCare,
-                _ => Severity::Usable,
+    // The value of the next sample may have been computed from the measurement.
+    let next = found.otherwise == Otherwise::Earlier || found.otherwise == Otherwise::OtherHold && held;
+    let with = objective.of(&found.problem, objective.sweep);
+    let (severity, moved) = match furthest(evidence, &with, unknowns) {
+        Some(Shift { of, part, errors }) if part.is_finite() => {
+            let severity = match errors > CARE {
+                true if part > FAR && !next => Severity::NotUsable,
+                true => Severity::UsableWithCare,
+                false => Severity::Usable,
             };
             let (part, errors) = (percent(part, 2), number(errors, 2));
-            (severity, format!("; `{name}` would move by about {part} of itself ({errors} standard errors)"))
+            (severity, format!("; {of} would move by about {part} of itself ({errors} standard errors)"))
         }
-        None => (Severity::UsableWithCare, String::new()),
+        _ => (Severity::UsableWithCare, String::new()),
     };
     let higher = number(found.log_likelihood, 3);
     let text = format!(
@@ -122,27 +126,19 @@ fn warning(evidence: &Evidence<'_>, found: Found<'_>, unknowns: &[Unknown]) -> W
     Warning::new(WarningCode::InputTiming, severity, text)
 }
 
-const EARLIER: &str = "check when the column is written, and shift it";
+const EARLIER: &str = "check when the column is written, and shift it; an input that is computed from the measurements, as by a controller, may look \
+                       like that, too";
 const LATER: &str = "check when the column is written, and whether the plant has a dead time or the actuator a lag that the model lacks";
-const HOLD: &str = "say how it behaves (`hold`)";
+const LINE: &str = "check what it does between samples, and declare its hold; an input that is computed from the measurements, as by a controller, may \
+                    look like that, too";
+const HELD: &str = "check what it does between samples, and declare its hold";
 
-/// The parameter that stands not in the noise alone and moves by most standard errors, by which part of itself, and by how many.
-fn furthest<'u>(
-    evidence: &Evidence<'_>,
-    objective: &Objective<'_>,
-    unknowns: &'u [Unknown],
-) -> Option<(&'u str, f64, f64)> {
+/// The largest move of a parameter that does not stand in the noise alone.
+fn furthest(evidence: &Evidence<'_>, objective: &Objective<'_>, unknowns: &[Unknown]) -> Option<Shift> {
     let linear = objective.evaluate(&evidence.point.end.coordinates).ok()?;
-    let held: Vec<bool> = unknowns.iter().map(|row| row.knowledge.standard_error().is_none()).collect();
-    let step = linear.step(&vec![0.0; unknowns.len()], &held)?;
     let levels = objective.sweep.levels();
-    let moves = |(unknown, step): (&'u Unknown, f64)| {
-        let error = unknown.knowledge.standard_error()?;
-        matches!(unknown.role, Role::Parameter(place) if !levels.contains(&place)).then_some(())?;
-        let change = (step * unknown.transform.slope(unknown.value)).abs();
-        Some((&*unknown.name, change / unknown.value.abs(), change / error))
-    };
-    unknowns.iter().zip(step).filter_map(moves).max_by(|a, b| a.2.total_cmp(&b.2))
+    let counts = |unknown: &Unknown| matches!(unknown.role, Role::Parameter(place) if !levels.contains(&place));
+    of_one(Some(evidence.point.linear), &linear, unknowns, counts)
 }
 
 /// A record whose inputs act otherwise.

@@ -110,17 +110,17 @@ fn missing_terms(evidence: &Evidence<'_>, intervals: &Intervals) -> Examined {
         let term = &made.terms[asked.term];
         let (state, by, compare) = match filtered {
             true => ("what is taken for process noise of `", "follows", ", or compare with a simulation"),
-            false => ("the errors ask for another term in the equation of `", "which follows", ""),
+            false => ("the errors contain what a term would make that is missing in the equation of `", "and follows", ""),
         };
+        let part = if asked.part.is_finite() { format!(" ({} of itself)", percent(asked.part, 2)) } else { String::new() };
         let text = format!(
-            "{state}{}` {by} {} ({} standard errors): its equation may lack such a term, with which `{}` would change by {} standard errors \
-             ({}); write the term into the model, with a parameter{compare}",
+            "{state}{}` {by} {} ({} standard errors): its equation may lack such a term, with which `{}` would change by {} standard \
+             errors{part}; write the term into the model, with a parameter{compare}",
             states[term.state].name,
             term.what,
             number(asked.errors, 2),
             intervals.unknowns[asked.unknown].name,
-            number(asked.moved, 2),
-            percent(asked.part, 2)
+            number(asked.moved, 2)
         );
         Warning::new(WarningCode::MissingTerm, severity, text).about(About::Unknown(asked.unknown))
     });
@@ -201,8 +201,8 @@ fn asked(
     by_sizes(evidence, &objective.of(&problem, &*problem.sweep), &coordinates, told)
 }
 
-/// Terms of a simulation with fewer standard errors where its errors are larger where the term acts (White, Econometrica 48 (1980) 817), or
-/// colored; by one more pass with slopes where there are such terms.
+/// The terms of a simulation, with larger standard errors where its errors are larger at the samples where the term acts (White, Econometrica 48
+/// (1980) 817), or are colored. It takes one more pass with slopes, if there is a term.
 fn by_sizes(
     evidence: &Evidence<'_>,
     objective: &Objective<'_>,
@@ -217,8 +217,7 @@ fn by_sizes(
     let mut all = objective.gather(coordinates, true, make).ok()?.into_iter();
     let mut sums = all.next()?;
     all.for_each(|one| sums.append(one));
-    let inflation = evidence.residuals.whiteness.iter().map(|white| white.variance_inflation).fold(1.0, f64::max);
-    let inflation = if evidence.uses_hac() { inflation } else { 1.0 };
+    let inflation = if evidence.uses_hac() { evidence.most_inflation() } else { 1.0 };
     for (asked, (_, [products, squares, errors, count])) in told.iter_mut().zip(sums.of) {
         let larger = products * count / (squares * errors);
         asked.errors /= (larger.max(1.0) * inflation).sqrt();
@@ -226,8 +225,8 @@ fn by_sizes(
     Some(told)
 }
 
-/// For each term its columns' factors that leave what is orthogonal to the unknowns, `z`, and the sums of `e^2 z^2`, `z^2` and `e^2` of the errors
-/// `e`, and of one.
+/// For each term: the coefficients of all columns that give the part `z` of its column which is orthogonal to the unknowns, and the sums over all
+/// measurements of `e^2 z^2`, `z^2`, `e^2` and 1, of errors `e`.
 struct Sizes {
     of: Vec<(Vec<f64>, [f64; 4])>,
 }

@@ -175,18 +175,25 @@ pub(super) struct Shift {
     /// By how many standard errors.
     pub errors: f64,
     /// By which part of itself.
-    part: f64,
+    pub part: f64,
 }
 
 /// The largest move of an unknown, or of what the data determine of several unknowns together.
 pub(super) fn shift(evidence: &Evidence<'_>, objective: &Objective<'_>, unknowns: &[Unknown]) -> Option<Shift> {
     let linear = objective.evaluate(&evidence.point.end.coordinates).ok()?;
-    let found = [of_one(Some(evidence.point.linear), &linear, unknowns), of_several(evidence, &linear, unknowns)];
+    let one = of_one(Some(evidence.point.linear), &linear, unknowns, |_| true);
+    let found = [one, of_several(evidence, &linear, unknowns)];
     found.into_iter().flatten().max_by(|a, b| a.errors.total_cmp(&b.errors))
 }
 
-/// The largest move of an unknown that is known by itself. The step that the estimate's own slopes ask for is subtracted: at a kink of the cost it is not zero.
-fn of_one(from: Option<&Linearization>, to: &Linearization, unknowns: &[Unknown]) -> Option<Shift> {
+/// The largest move of an unknown that is known by itself, of those that count. The step that the estimate's own slopes ask for is subtracted: at a
+/// kink of the cost it is not zero.
+pub(super) fn of_one(
+    from: Option<&Linearization>,
+    to: &Linearization,
+    unknowns: &[Unknown],
+    counts: impl Fn(&Unknown) -> bool,
+) -> Option<Shift> {
     let held: Vec<bool> = unknowns.iter().map(|row| row.knowledge.standard_error().is_none()).collect();
     let step = |linear: &Linearization| linear.step(&vec![0.0; unknowns.len()], &held);
     let here = from.and_then(step).unwrap_or(vec![0.0; unknowns.len()]);
@@ -196,7 +203,8 @@ fn of_one(from: Option<&Linearization>, to: &Linearization, unknowns: &[Unknown]
         let errors = change / unknown.knowledge.standard_error()?;
         Some(Shift { of: format!("`{}`", unknown.name), errors, part: change / unknown.value.abs() })
     };
-    (0..unknowns.len()).filter_map(of).max_by(|a, b| a.errors.total_cmp(&b.errors))
+    let counted = (0..unknowns.len()).filter(|i| counts(&unknowns[*i]));
+    counted.filter_map(of).max_by(|a, b| a.errors.total_cmp(&b.errors))
 }
 
 /// The move of unknowns that the data determine only together, such as the product of a scale and a rate.
@@ -280,7 +288,7 @@ mod tests {
             let mut unknowns = problem.estimate(&[coordinate]).unwrap().unknowns;
             unknowns[0].knowledge = Knowledge::Known { standard_error: 0.5, lower: 1.0, upper: 3.0 };
             let linear = problem.objective().unwrap().evaluate(&[coordinate]).unwrap();
-            let found = of_one(None, &linear, &unknowns).unwrap();
+            let found = of_one(None, &linear, &unknowns, |_| true).unwrap();
             assert!(
                 (found.errors - 2.0).abs() < 1e-12 && (found.part - 0.5).abs() < 1e-12,
                 "{} {}",

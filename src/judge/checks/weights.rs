@@ -1,7 +1,8 @@
 //! Weights that follow the measurements, whose noise is then correlated with them.
 //!
-//! With `y = m + e` the score `sum w(y) e s` of slopes `s` has the mean `sum w'(y) s` times the variance of the noise (Stein, Annals of Statistics 9
-//! (1981) 1135: of Gaussian noise), where it should have none. One Gauss-Newton step says how far that moves the unknowns.
+//! The estimate makes the score `sum w e s` zero, of weights `w`, errors `e` and slopes `s`. Its mean at the true parameters should be zero. Where `w`
+//! depends on the measurement `y`, it is `sum w'(y) s` times the variance of Gaussian noise (Stein, Annals of Statistics 9 (1981) 1135). One
+//! Gauss-Newton step gives the bias of the unknowns.
 
 use super::*;
 use crate::problem::Accumulate;
@@ -31,9 +32,9 @@ fn weights(evidence: &Evidence<'_>, unknowns: &[Unknown]) -> Option<Warning> {
     };
     let of = |record: &Record| -> Vec<Vec<f64>> { (0..errors.len()).map(|j| along(record, j)).collect() };
     let along: Vec<Vec<Vec<f64>>> = objective.problem.records.iter().map(of).collect();
-    let follows = |j: usize| along.iter().any(|record| record[j].iter().any(|by| *by != 0.0));
+    let follows = |j: usize| along.iter().any(|record| record[j].iter().any(|by| by.abs() > 0.0));
     let j = (0..errors.len()).find(|j| follows(*j))?;
-    // In the units by which errors and slopes are divided.
+    // The variance of the noise, in units of the standardized errors and slopes.
     let sizes: Vec<f64> =
         errors.iter().zip(objective.whitening.sigma()).map(|(error, sigma)| error * error / sigma).collect();
     let columns = |e: usize| objective.problem.unknowns.columns(e);
@@ -51,14 +52,15 @@ fn weights(evidence: &Evidence<'_>, unknowns: &[Unknown]) -> Option<Warning> {
     };
     let biases = unknowns.iter().enumerate().filter_map(bias);
     let (i, change, errors) = biases.max_by(|a, b| a.2.total_cmp(&b.2)).filter(|(.., errors)| *errors > BIAS)?;
+    let part = (change / unknowns[i].value).abs();
+    let part = if part.is_finite() { format!("{} of it, ", percent(part, 2)) } else { String::new() };
     let text = format!(
-        "the weights follow the measured `{}`, whose noise biases `{}` by about {}{} ({} of it, {} standard errors), which no interval allows for: weigh by \
+        "the weights follow the measured `{}`, whose noise biases `{}` by about {}{} ({part}{} standard errors), which no interval allows for: weigh by \
          time, by inputs, or by what a model predicts",
         objective.problem.layout().outputs[j].name,
         unknowns[i].name,
         number(change, 2),
         unit_after(&unknowns[i].unit),
-        percent((change / unknowns[i].value).abs(), 2),
         number(errors, 2)
     );
     Some(with_care(WarningCode::InputNoise, text).about(About::Unknown(i)))
@@ -71,7 +73,7 @@ fn moved(record: &Record, j: usize, by: f64) -> Record {
     Record { outputs: outputs.into(), ..record.clone() }
 }
 
-/// The mean of the score by the noise in the weights.
+/// The mean of the score that the noise in the weights makes.
 struct Score<'s> {
     /// Slopes of the weights, output by output and sample by sample.
     along: &'s [Vec<f64>],
