@@ -196,16 +196,25 @@ def time_column(names: Sequence[str], said: str | None = None) -> str | None:
 
 
 def _counted(stamps: Any, name: str) -> Any:
-    """Give numbers in seconds, from the unit that the name of their column says, or, so large, from one since 1970, with a warning."""
+    """Give numbers in seconds, from the unit that the name of their column says, or, so large, from one since 1970, with a warning.
+
+    Whole ones since 1970 are given as durations.
+    """
     if stamps.dtype.kind == "m":
         return stamps
+    header = _core.Header([name])
     try:
-        unit, origin = _core.Header([name]).seconds(0, float(stamps[0]) if len(stamps) else 0.0)
+        unit, origin = header.seconds(0, float(stamps[0]) if len(stamps) else 0.0)
+        named, _ = header.seconds(0, 1.0)
     except Error as error:
         raise Error(in_python(str(error))) from None
-    if origin != 0.0:
+    if origin != 0.0 and named != unit:
         taken = f"the times in `{name}` are taken as {_SINCE_1970[unit]} since 1970 (the first is {origin:.15g})"
         warn(RecordWarning(f"{taken}; if they are others, say their unit in the name, such as `{name} [ns]`"))
+    if origin != 0.0 and stamps.dtype.kind == "i":
+        # As durations, since nanoseconds from 1970 on are off by up to 128 as floats.
+        return (stamps * round(unit * 1e9)).astype("timedelta64[ns]")
+    stamps = stamps.astype(np.float64, copy=False)
     return stamps if (unit, origin) == (1.0, 0.0) else (stamps - origin) * unit
 
 
@@ -321,7 +330,8 @@ def _stamps(values: Any, what: str) -> Any:
         of = array.astype("datetime64[ns]") if array.dtype.kind == "M" else array.astype("timedelta64[ns]")
         return of.astype(np.int64).astype("timedelta64[ns]")
     if array.dtype.kind in "fiu":
-        return np.ascontiguousarray(array, dtype=np.float64)
+        # Those of small unsigned kinds have no differences.
+        return np.ascontiguousarray(array, dtype=np.int64 if array.dtype.kind == "i" else np.float64)
     shown = f"has {array.tolist()[0]!r} ({array.dtype})" if array.size else "is empty"
     raise Error(
         f"{what} {shown}, which is neither a number (s) nor a date; convert it first, such as by pandas.to_datetime, or give the time "

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import datetime
 import re
+import warnings
 from collections.abc import Callable
 from typing import Any
 
@@ -157,6 +158,12 @@ def test_numbers_since_1970_are_recognized() -> None:
     stamps = (1_742_480_000_000 + (c["t"] * 1e3).round()).astype(np.int64)
     with pytest.warns(gb.RecordWarning, match="`t` are taken as milliseconds since 1970 .*the first is 1742480000000.*say their unit"):
         assert abs(k_of({**c, "t": stamps}) / k_of(c) - 1) < 1e-9
+    # As floats they would be multiples of 256.
+    fine = {**c, "t [ns]": 1_742_480_000_000_000_123 + (c["t"] * 1e9).round().astype(np.int64)}
+    del fine["t"]
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert abs(k_of(fine) / k_of(c) - 1) < 1e-12
     # The clock of a computer that runs for an hour, in nanoseconds.
     frame = {"t [ns]": 3.6e12 + c["t"] * 1e9, "room": c["room"], "body": c["body"]}
     assert abs(k_of(frame) / k_of(c) - 1) < 1e-9

@@ -3,7 +3,7 @@
 
 use crate::pmsm::Pmsm;
 use crate::refused::says;
-use arrow_array::{ArrayRef, DurationMillisecondArray, Float64Array, RecordBatch, Time32MillisecondArray};
+use arrow_array::{ArrayRef, DurationMillisecondArray, Float64Array, Int64Array, RecordBatch, Time32MillisecondArray};
 use greybox::layout::Layout;
 use greybox::record::Record;
 use greybox::{DataFile, Error, Time};
@@ -72,6 +72,26 @@ fn arrow(name: &str, times: ArrayRef) -> DataFile {
     writer.write(&batch).unwrap();
     writer.finish().unwrap();
     DataFile::new(path)
+}
+
+/// As `f64` they are multiples of 256.
+#[test]
+fn whole_nanoseconds_since_1970_are_not_rounded() {
+    let count = |k: i64| 1_742_479_500_000_000_123 + 126_000 * k;
+    let cells: Vec<[u8; 8]> = (0..100).map(|k| count(k).to_le_bytes()).collect();
+    let files = [
+        archive("nanoseconds.npz", "time", "<i8", &cells),
+        arrow("nanoseconds.arrow", Arc::new((0..100).map(|k| Some(count(k))).collect::<Int64Array>())),
+    ];
+    for file in files {
+        let record = read(&file).unwrap();
+        let Time::Uniform { start, step } = record.times() else { panic!("{:?}", record.times()) };
+        // Rounding of a hundred sums.
+        assert!(*start == 0.0 && (step / 126e-6 - 1.0).abs() < 1e-14, "{start} {step}");
+    }
+    // Keys beyond 2^53 keep all their digits.
+    let file = archive("counts.npz", "key", "<i8", &cells).sample_time(1.0);
+    assert_eq!(file.read_groups(&Layout::of::<Pmsm>(), "key").unwrap().len(), 100);
 }
 
 /// As those of a text: from the first, on past midnight.

@@ -3,7 +3,7 @@
 
 use crate::pmsm::Pmsm;
 use crate::refused::says;
-use greybox::{DataFile, Experiment, ExperimentOf, TimeUnit};
+use greybox::{DataFile, Experiment, ExperimentOf, Time, TimeUnit};
 use std::path::PathBuf;
 
 fn file(name: &str, header: &str, times: &[f64]) -> PathBuf {
@@ -49,6 +49,21 @@ fn what_is_no_unit_of_time_is_refused() {
     let now: Vec<f64> = (0..3).map(|k| 1_742_479_500_000.0 + f64::from(k)).collect();
     assert!((read("epoch", "timestamp", &now).read(&Pmsm).unwrap().time(1) - 1e-3).abs() < 1e-12);
     says(read("serial", "date", &[45_736.0, 45_737.0]).read(&Pmsm), &["column `date`", "written as numbers"]);
+}
+
+/// As `f64` nanoseconds since 1970 are multiples of 256; the steps of 126,000 stay even, whether the header names the unit or not.
+#[test]
+fn whole_nanoseconds_since_1970_are_not_rounded() {
+    for (name, header) in [("nanoseconds", "time [ns]"), ("counts", "time")] {
+        let rows: String = (0..100).map(|k| format!("{},1,2,3,4\n", 1_742_479_500_000_000_123 + 126_000 * k)).collect();
+        let path = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(format!("time_unit_{name}.csv"));
+        std::fs::write(&path, format!("{header},ud,w,id,iq\n{rows}")).unwrap();
+        let record = Experiment::from_file(&Pmsm, path).unwrap();
+        let Time::Uniform { start, step } = record.times() else { panic!("{:?}", record.times()) };
+        assert_eq!(*start, 0.0);
+        // Rounding of a hundred sums.
+        assert!((step / 126e-6 - 1.0).abs() < 1e-14, "{step}");
+    }
 }
 
 /// The unit is that of the numbers where these are not converted, and that of the factor where the file names none.

@@ -14,6 +14,7 @@ use super::read::Plan;
 use super::{DataFile, FileFormat, Reading};
 use crate::error::Error;
 use crate::record::Record;
+use std::borrow::Cow;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// An open file of columns.
@@ -41,6 +42,8 @@ pub(super) trait Columns {
 pub(super) enum Cells {
     /// Numbers; NaN where there is none.
     Numbers(Vec<f64>),
+    /// Whole numbers of 64 bits.
+    Whole(Vec<Option<i64>>),
     /// Lengths of time (s).
     Seconds(Vec<f64>),
     /// Times of day: nanoseconds since midnight.
@@ -57,7 +60,7 @@ impl Cells {
     /// What the cells are.
     pub(super) fn kind(&self) -> &'static str {
         match self {
-            Cells::Numbers(_) => "numbers",
+            Cells::Numbers(_) | Cells::Whole(_) => "numbers",
             Cells::Seconds(_) => "lengths of time",
             Cells::Clocks(_) => "times of day",
             Cells::Instants { .. } => "dates",
@@ -68,8 +71,17 @@ impl Cells {
     fn len(&self) -> usize {
         match self {
             Cells::Numbers(numbers) | Cells::Seconds(numbers) => numbers.len(),
-            Cells::Clocks(nanoseconds) | Cells::Instants { nanoseconds, .. } => nanoseconds.len(),
+            Cells::Whole(counts) | Cells::Clocks(counts) | Cells::Instants { nanoseconds: counts, .. } => counts.len(),
             Cells::Texts(texts) => texts.len(),
+        }
+    }
+
+    /// The numbers, if there are any.
+    fn numbers(&self) -> Option<Cow<'_, [f64]>> {
+        match self {
+            Cells::Numbers(numbers) => Some(numbers.into()),
+            Cells::Whole(counts) => Some(counts.iter().map(|count| count.map_or(f64::NAN, |count| count as f64)).collect()),
+            _ => None,
         }
     }
 
@@ -88,6 +100,10 @@ impl Cells {
                 // Minus zero is zero.
                 let key = |number: f64| if number.is_nan() { String::new() } else { (number + 0.0).to_string() };
                 Ok(Cells::Texts(numbers.into_iter().map(key).collect()))
+            }
+            Cells::Whole(counts) => {
+                let key = |count: Option<i64>| count.map_or(String::new(), |count| count.to_string());
+                Ok(Cells::Texts(counts.into_iter().map(key).collect()))
             }
             Cells::Texts(_) => Ok(self),
             _ => Err(self.kind().to_owned()),
@@ -225,7 +241,7 @@ impl DataFile {
         let name = |column: usize| file.names()[column].as_str();
         let mut columns = Vec::with_capacity(plan.sources.len());
         for (source, cells) in plan.sources.iter().zip(cells) {
-            let Cells::Numbers(numbers) = cells else {
+            let Some(numbers) = cells.numbers() else {
                 return Err(self.wrong_kind(name(source.column), cells.kind(), "numbers"));
             };
             columns.push(match rows {

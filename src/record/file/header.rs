@@ -1,6 +1,7 @@
 //! [`Header`]: the names of the columns of a table in memory.
 
 use super::DataFile;
+use super::timing::Count;
 use crate::error::Error;
 use crate::layout::Quantity;
 
@@ -72,7 +73,7 @@ impl Header {
             return Err(self.file.cannot(format!("there is no column in place {time} of {columns} (from zero)")));
         };
         let file = self.timed(Some(name));
-        Ok(file.ticks(&self.names, None, time, first)?.map_or((1.0, 0.0), |ticks| (ticks.unit, ticks.origin)))
+        Ok(file.ticks(&self.names, None, time, Count::Number(first))?.map_or((1.0, 0.0), |ticks| (ticks.unit, ticks.origin)))
     }
 
     fn timed(&self, said: Option<&str>) -> DataFile {

@@ -25,6 +25,9 @@ const NO_UNITS: [&str; 5] = ["", "utc", "gmt", "local", "unix"];
 /// Numbers beyond these are no seconds: milliseconds, microseconds and nanoseconds since 1970.
 const SINCE_1970: [(f64, f64); 3] = [(1e17, 1e-9), (1e14, 1e-6), (1e11, 1e-3)];
 
+/// From here on not every whole number is one of `f64`.
+const ROUNDED: f64 = 9_007_199_254_740_992.0;
+
 /// The time of the rows so far.
 pub(super) enum Timing {
     /// A constant step (s).
@@ -44,11 +47,40 @@ pub(super) struct Ticks {
     pub(super) shown: TimeUnit,
     offset: f64,
     pub(super) origin: f64,
+    /// The origin, if that is a whole number: as `f64` one of nanoseconds since 1970 is rounded to 256.
+    whole: Option<i64>,
 }
 
 impl Ticks {
-    pub(super) fn time(&self, number: f64) -> f64 {
-        (number - self.origin) * self.unit + self.offset
+    pub(super) fn time(&self, count: Count) -> f64 {
+        let since = match (count, self.whole) {
+            (Count::Whole(count), Some(origin)) => (i128::from(count) - i128::from(origin)) as f64,
+            _ => count.number() - self.origin,
+        };
+        since * self.unit + self.offset
+    }
+}
+
+/// A number in a column of time.
+#[derive(Clone, Copy)]
+pub(super) enum Count {
+    Number(f64),
+    Whole(i64),
+}
+
+impl Count {
+    /// In a cell of a text that is this number.
+    fn read(cell: &[u8], number: f64) -> Count {
+        let large = number.abs() >= ROUNDED;
+        let whole = large.then(|| std::str::from_utf8(cell).ok()?.trim().parse().ok()).flatten();
+        whole.map_or(Count::Number(number), Count::Whole)
+    }
+
+    fn number(self) -> f64 {
+        match self {
+            Count::Number(number) => number,
+            Count::Whole(count) => count as f64,
+        }
     }
 }
 
@@ -119,8 +151,9 @@ impl DataFile {
         names: &[String],
         below: Option<&str>,
         column: usize,
-        first: f64,
+        first: Count,
     ) -> Result<Option<Ticks>, Error> {
+        let number = first.number();
         let (name, said) = (&names[column], self.said("t"));
         if name.is_empty() && said.name.is_none() {
             return self.place(names, "t").map(|_| None);
@@ -141,18 +174,21 @@ impl DataFile {
                 self.cannot(format!("column `{name}` has times in `{text}`, no unit of time that is known: {remedy}"))
             );
         }
-        if said.factor.is_none() && (is_compact(first) || named.is_none() && DATES.contains(&plain(name).as_str())) {
+        if said.factor.is_none() && (is_compact(number) || named.is_none() && DATES.contains(&plain(name).as_str())) {
             return Err(self.cannot(format!(
-                "column `{name}` has dates that are written as numbers ({first}): write them as 2025-03-20 14:05:00, or, if they are a count, {remedy}"
+                "column `{name}` has dates that are written as numbers ({number}): write them as 2025-03-20 14:05:00, or, if they are a count, {remedy}"
             )));
         }
         self.no_dates(name)?;
         let unit = said.factor.or_else(|| named.as_ref().map(TimeUnit::seconds));
-        let long_ago = SINCE_1970.iter().find(|(least, _)| unit.is_none() && first.abs() >= *least);
-        let (unit, origin) = long_ago.map_or((unit.unwrap_or(1.0), 0.0), |(_, unit)| (*unit, first));
+        // A unit that is named says the same of numbers of that size.
+        let is_unit = |one: f64| unit.is_none_or(|unit| said.factor.is_none() && (unit / one - 1.0).abs() < 1e-9);
+        let long_ago = SINCE_1970.iter().find(|(least, one)| number.abs() >= *least && is_unit(*one));
+        let (unit, origin) = long_ago.map_or((unit.unwrap_or(1.0), 0.0), |(_, unit)| (*unit, number));
+        let whole = if let Count::Whole(first) = first { Some(first).filter(|_| origin != 0.0) } else { None };
         let shown = shown(named, unit);
         let unit = if said.reversed { -unit } else { unit };
-        Ok(Some(Ticks { column, unit, shown, offset: said.offset, origin }))
+        Ok(Some(Ticks { column, unit, shown, offset: said.offset, origin, whole }))
     }
 
     /// Refuses what was said of dates, of a column of time that has none.
@@ -200,7 +236,7 @@ impl DataFile {
     ) -> Result<Timing, Error> {
         let cell = table.cell(column);
         if let Some(number) = numbers.read(cell) {
-            let Some(ticks) = self.ticks(table.names(), table.form().unit(column), column, number)? else {
+            let Some(ticks) = self.ticks(table.names(), table.form().unit(column), column, Count::read(cell, number))? else {
                 return Ok(Timing::Even(1.0));
             };
             // A pipe cannot be read again.
@@ -263,7 +299,8 @@ impl Timing {
         match self {
             Timing::Even(step) => Ok(sample as f64 * *step),
             Timing::Numbers { ticks, clock, stamps } => {
-                let number = numbers.read(table.cell(ticks.column)).map(|number| ticks.time(number));
+                let cell = table.cell(ticks.column);
+                let number = numbers.read(cell).map(|number| ticks.time(Count::read(cell, number)));
                 let Some(time) = number.filter(|time| time.is_finite()) else {
                     let time = Moment { time: f64::NAN, unit: ticks.shown.clone() };
                     return Err(file.bad_cell(table, ticks.column, number, "t", sample, time));
@@ -342,7 +379,8 @@ fn stamps_of(file: &DataFile, table: &Table, numbers: &Numbers, ticks: &Ticks, r
     let (mut table, mut numbers) = (table.again(file)?, numbers.clone());
     let mut stamps = Vec::with_capacity(rows + 1);
     while stamps.len() < rows && table.next()? {
-        stamps.extend(numbers.read(table.cell(ticks.column)).map(|number| ticks.time(number)));
+        let cell = table.cell(ticks.column);
+        stamps.extend(numbers.read(cell).map(|number| ticks.time(Count::read(cell, number))));
     }
     Ok(stamps)
 }

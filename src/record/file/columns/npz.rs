@@ -91,6 +91,10 @@ impl Columns for Npz<'_> {
     }
 }
 
+fn whole(bytes: [u8; 8], big: bool) -> i64 {
+    if big { i64::from_be_bytes(bytes) } else { i64::from_le_bytes(bytes) }
+}
+
 /// The cells of an array of this kind, as NumPy names it: `<f8`, `|b1`, `<M8[ns]`.
 fn cells(kind: &str, data: &[u8]) -> Option<Cells> {
     let (order, kind) = kind.split_at_checked(1)?;
@@ -98,8 +102,7 @@ fn cells(kind: &str, data: &[u8]) -> Option<Cells> {
     if let Some(unit) = kind.strip_prefix("M8[").or(kind.strip_prefix("m8[")) {
         let (_, unit) = UNITS.iter().find(|(name, _)| Some(*name) == unit.strip_suffix(']'))?;
         let (counts, rest) = data.as_chunks::<8>();
-        let counts =
-            counts.iter().map(|count| if big { i64::from_be_bytes(*count) } else { i64::from_le_bytes(*count) });
+        let counts = counts.iter().map(|count| whole(*count, big));
         return rest.is_empty().then(|| match kind.starts_with('M') {
             true => {
                 let nanoseconds =
@@ -111,6 +114,10 @@ fn cells(kind: &str, data: &[u8]) -> Option<Cells> {
                 Cells::Seconds(counts.map(seconds).collect())
             }
         });
+    }
+    if kind == "i8" {
+        let (counts, rest) = data.as_chunks::<8>();
+        return rest.is_empty().then(|| Cells::Whole(counts.iter().map(|count| Some(whole(*count, big))).collect()));
     }
     numbers(kind, big, data).map(Cells::Numbers)
 }

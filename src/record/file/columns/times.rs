@@ -2,6 +2,7 @@
 
 use super::super::read::Plan;
 use super::super::stamp::Stamp;
+use super::super::timing::Count;
 use super::super::{DataFile, Fault, TimeSource};
 use super::{Cells, Columns};
 use crate::error::Error;
@@ -26,10 +27,15 @@ impl DataFile {
         let samples = rows.map_or(cells.len(), <[usize]>::len);
         let column = file.names()[at].clone();
         match cells {
-            Cells::Numbers(numbers) => {
-                let first = if samples == 0 { 0.0 } else { numbers[row(0)] };
+            Cells::Numbers(_) | Cells::Whole(_) => {
+                let number = |sample: usize| match cells {
+                    Cells::Numbers(numbers) => Count::Number(numbers[row(sample)]),
+                    Cells::Whole(counts) => counts[row(sample)].map_or(Count::Number(f64::NAN), Count::Whole),
+                    _ => Count::Number(f64::NAN),
+                };
+                let first = if samples == 0 { Count::Number(0.0) } else { number(0) };
                 let Some(ticks) = self.ticks(file.names(), file.unit(at), at, first)? else { return even(1.0) };
-                let stamps = (0..samples).map(|sample| ticks.time(numbers[row(sample)])).collect();
+                let stamps = (0..samples).map(|sample| ticks.time(number(sample))).collect();
                 let source = TimeSource::Numbers { column, unit: ticks.unit, origin: ticks.origin };
                 Ok(((Time::from_stamps(stamps), ticks.shown), source))
             }

@@ -27,8 +27,9 @@ pub(super) fn append(cells: &mut Option<Cells>, array: &ArrayRef) -> Result<(), 
         texts.extend(self::texts(array).ok_or_else(other)?);
         return Ok(());
     }
-    let more = numbers(array)
-        .map(Cells::Numbers)
+    let more = whole(array)
+        .map(Cells::Whole)
+        .or_else(|| numbers(array).map(Cells::Numbers))
         .or_else(|| seconds(array).map(Cells::Seconds))
         .or_else(|| clocks(array).map(Cells::Clocks))
         .or_else(|| instants(array))
@@ -40,7 +41,8 @@ pub(super) fn append(cells: &mut Option<Cells>, array: &ArrayRef) -> Result<(), 
             all.extend(more);
         }
         (Some(Cells::Instants { nanoseconds: all, .. }), Cells::Instants { nanoseconds: more, .. })
-        | (Some(Cells::Clocks(all)), Cells::Clocks(more)) => all.extend(more),
+        | (Some(Cells::Clocks(all)), Cells::Clocks(more))
+        | (Some(Cells::Whole(all)), Cells::Whole(more)) => all.extend(more),
         _ => return Err(other()),
     }
     Ok(())
@@ -49,6 +51,14 @@ pub(super) fn append(cells: &mut Option<Cells>, array: &ArrayRef) -> Result<(), 
 /// Each value as a number; NaN where there is none.
 fn each<T: ArrowPrimitiveType>(array: &ArrayRef, number: impl Fn(T::Native) -> f64) -> Vec<f64> {
     array.as_primitive::<T>().iter().map(|value| value.map_or(f64::NAN, &number)).collect()
+}
+
+/// Whole numbers of 64 bits.
+fn whole(array: &ArrayRef) -> Option<Vec<Option<i64>>> {
+    match array.data_type() {
+        DataType::Int64 => Some(array.as_primitive::<Int64Type>().iter().collect()),
+        _ => None,
+    }
 }
 
 fn numbers(array: &ArrayRef) -> Option<Vec<f64>> {
@@ -62,7 +72,6 @@ fn numbers(array: &ArrayRef) -> Option<Vec<f64>> {
         DataType::Int8 => each::<Int8Type>(array, f64::from),
         DataType::Int16 => each::<Int16Type>(array, f64::from),
         DataType::Int32 => each::<Int32Type>(array, f64::from),
-        DataType::Int64 => each::<Int64Type>(array, |value| value as f64),
         DataType::UInt8 => each::<UInt8Type>(array, f64::from),
         DataType::UInt16 => each::<UInt16Type>(array, f64::from),
         DataType::UInt32 => each::<UInt32Type>(array, f64::from),
