@@ -7,6 +7,7 @@ from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
+from greybox.checks import mapping, number, shown
 from greybox.errors import Error, RecordWarning, warn
 from greybox.frames import Array
 from greybox.signals import near
@@ -66,9 +67,9 @@ def align(
     >>> gb.align({"u": (t, [0, 1, 2, 3, 4]), "y": ([0.0, 2.0, 4.0], [5, 6, 7])}, method={"y": "own"})["y"].tolist()
     [5.0, nan, 6.0, nan, 7.0]
     """
-    if not signals:
+    if not mapping("the first argument", signals, "the times and the values of each signal by its name: {\"u\": (times, values)}"):
         raise Error("there are no signals to align")
-    of = {name: _checked(name, *pair) for name, pair in signals.items()}
+    of = {name: _checked(name, *_pair(name, pair)) for name, pair in signals.items()}
     chosen = _methods(method, list(of))
     filled = {name: pair for name, pair in of.items() if chosen[name] != "own"} or of
     first, last = max(times[0] for times, _ in filled.values()), min(times[-1] for times, _ in filled.values())
@@ -83,6 +84,12 @@ def align(
         _remark(name, chosen[name], times, common)
         found[name] = _brought(chosen[name], times, values, common, between)
     return found
+
+
+def _pair(name: str, given: Any) -> tuple[Any, Any]:
+    if not isinstance(given, (tuple, list)) or len(given) != 2:
+        raise Error(f"signal `{name}` is {shown(given)}; give its times and its values: (times, values)")
+    return given[0], given[1]
 
 
 def _checked(name: str, times: Any, values: Any) -> tuple[Array, Array]:
@@ -118,6 +125,7 @@ def _methods(method: Method | Mapping[str, Method] | None, names: list[str]) -> 
 
 def _common(of: Mapping[str, tuple[Array, Array]], first: float, last: float, step: float | None) -> Array:
     if step is not None:
+        step = number("step", step)
         if not (np.isfinite(step) and step > 0.0):
             raise Error(f"the step is {step!r}; it must be positive and finite (s)")
         return np.asarray(first + step * np.arange(int((last - first) / step * (1 + 1e-12)) + 1), dtype=np.float64)

@@ -70,6 +70,8 @@ def fleet(
 
     if given.get("sample_time") is not None:
         raise Error("a shuffle does not keep the order of samples, which sample_time needs; add a column of the time")
+    if not all(isinstance(name, str) for name in frame.columns):
+        frame = frame.rename(columns=str)
     made = plan(model, by, parameters, Record(None, None, time, None, columns, hold, initial), given)
     # Raises if one is missing.
     made.needed(list(frame.columns))

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from greybox import _core
+from greybox.checks import number, text
 from greybox.errors import Error, FitWarning
 from greybox.frames import Kind
 from greybox.model import Equations, of_parameters
@@ -119,9 +120,9 @@ class Estimate:
         Error
             If the unknown has no interval, or there is none of this name.
         """
-        if name not in self.unknowns:
+        if text("name", name) not in self.unknowns:
             raise Error(f"there is no unknown `{name}`; the fit has: {near(name, self.unknowns)}")
-        found = self._estimate.interval(name, probability)
+        found = self._estimate.interval(name, number("probability", probability))
         if found is None:
             raise Error(f"`{name}` has no interval of probability {probability!r}; the printed fit says what is known of it")
         return found
@@ -148,7 +149,7 @@ class Estimate:
         if own and len(names) > 1 and record not in names:
             raise Error(f"`{own[0]}` has a value for each record: say which by record=; there are {', '.join(names)}")
         at = names.index(record) if record in names else 0
-        value, error, interval = self._estimate.derived(at, name, of_parameters(self._equations, function))
+        value, error, interval = self._estimate.derived(at, text("name", name) or "", of_parameters(self._equations, function))
         lower, upper = interval or (float("nan"), float("nan"))
         return Derived(name, value, _number(error), lower, upper)
 

@@ -9,14 +9,16 @@ from pathlib import Path
 from typing import Any
 
 from greybox import _core
+from greybox.checks import text, whole
 from greybox.errors import Error, warn
+from greybox.frames import joined
 from greybox.model import Model, checked
-from greybox.options import Noise, settings
-from greybox.parameters import Parameter, declared, together
+from greybox.options import Noise, by_name, settings
+from greybox.parameters import Parameter, check_labels, declared, together
 from greybox.progress import Progress
 from greybox.records import Hold, Initial, Record, framed, is_path, kind_of, records
 from greybox.result import Fit
-from greybox.signals import named, near
+from greybox.signals import Signals, named
 
 __all__ = ["fit", "simulate"]
 
@@ -155,9 +157,10 @@ def fit(
     several = records(data, what)
     cores = [one.core(equations, f"record {k + 1}" if len(several) > 1 else "record") for k, one in enumerate(several)]
     declared_ = declared(given, named(equations.parameters, "parameters"))
+    check_labels(equations, declared_, [core.name for core in cores])
     problem = _core.Problem(equations.core, cores, declared_, chosen)
-    with Progress(progress, "fit") as shown:
-        estimate = problem.run(shown)
+    with Progress(progress, "fit") as bar:
+        estimate = problem.run(bar)
     files = [Path(one.data).resolve() for one in several if is_path(one.data)]
     found = Fit(equations, cores, declared_, chosen, kind_of(several[0].data), estimate, problem, what, files)
     for warning in found.warnings:
@@ -181,7 +184,10 @@ def simulate(
     hold: Hold | None = None,
     integrator: str | None = None,
 ) -> Any:
-    """Simulate a model.
+    """Simulate a model without noise, but for that of `noise`.
+
+    What the model says of noise (``diffusion``, ``noise``, and the levels of a model file) is for estimates: no process noise is simulated, and
+    no noise of outputs is taken from there.
 
     Parameters
     ----------
@@ -194,9 +200,9 @@ def simulate(
     initial : mapping from str to float, optional
         The state at the first sample. One that is left out is as the model says it (``initial``), or zero.
     noise : mapping from str to float, optional
-        The standard deviation of white noise that is added to each output; none where it is left out.
+        The standard deviation of white noise that is added to each output; without it, and of outputs that are left out, there is none.
     seed : int
-        Of the noise: the same seed gives the same noise.
+        Of `noise`: the same seed gives the same noise. Without `noise` it has no effect.
     time, sample_time, columns, hold
         Of the frame, as in :class:`Record`.
     integrator : str, optional
@@ -216,22 +222,25 @@ def simulate(
     equations = checked(model).equations()
     inputs, outputs = named(equations.inputs, "inputs"), named(equations.outputs, "outputs")
     states, names = named(equations.states, "states"), named(equations.parameters, "parameters")
-    values = [_number("parameter", name, parameters, names) for name in names]
-    for what, mapping, known in (("parameters", parameters, names), ("initial", initial or {}, states), ("noise", noise or {}, outputs)):
-        unknown = [name for name in mapping if name not in known]
-        if unknown:
-            raise Error(f"{what} names `{unknown[0]}`, and the model has: {near(unknown[0], known)}")
-    start = [float(initial[name]) if initial and name in initial else None for name in states]
+    values = by_name("parameters", parameters, names, "a value")
+    missing = [name for name in names if name not in values]
+    if missing:
+        raise Error(f"parameter `{missing[0]}` has no value; give one for each of {', '.join(names)}")
+    start, sigma, seed = by_name("initial", initial, states, "a value"), _sigma(noise, outputs), whole("seed", seed, 0, 2**64 - 1)
     data = framed(data)
     record = Record(data, None, time, sample_time, columns, hold).core(equations, "simulation", outputs=False)
-    found = equations.core.simulate(values, start, record, integrator or equations.defaults().get("integrator"))
+    method = text("integrator", integrator) or equations.defaults().get("integrator")
+    found = equations.core.simulate(list(values.values()), [start.get(name) for name in states], record, method)
     if noise:
-        found = found.with_noise([float(noise.get(name, 0.0)) for name in outputs], seed)
-    columns_ = dict(zip([*inputs, *outputs], [*found.inputs(), *found.outputs()], strict=True))
-    return kind_of(data)({"t": found.time(), **columns_})
+        found = found.with_noise(sigma, seed)
+    columns_ = [*zip(inputs, found.inputs(), strict=True), *zip(outputs, found.outputs(), strict=True)]
+    return kind_of(data)(joined([("t", found.time()), *columns_]))
 
 
-def _number(what: str, name: str, values: Mapping[str, float], names: Any) -> float:
-    if name not in values:
-        raise Error(f"{what} `{name}` has no value; give one for each of {', '.join(names)}")
-    return float(values[name])
+def _sigma(noise: Mapping[str, float] | None, outputs: Signals) -> list[float]:
+    """Give the level of noise of each output."""
+    given = by_name("noise", noise, outputs, "a standard deviation")
+    for name, level in given.items():
+        if not 0.0 <= level < float("inf"):
+            raise Error(f"`{name}` of noise is {level!r}; give a finite standard deviation of zero or more")
+    return [given.get(name, 0.0) for name in outputs]

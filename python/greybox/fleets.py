@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeAlias
 
 import numpy as np
 
 from greybox import _core
+from greybox.checks import column_name
 from greybox.errors import Error
 from greybox.estimate import VERDICTS
-from greybox.frames import Frame, is_readonly, place, rename, seconds, steps, time_column
+from greybox.frames import INDEX, Frame, is_readonly, place, rename, seconds, steps, time_column
 from greybox.model import Model, checked
 from greybox.options import Options, settings
 from greybox.parameters import Parameter, declared, together
@@ -48,10 +49,13 @@ class Plan:
         if options.get("checkpoint") is not None:
             raise Error("a fleet has no checkpoint; fit the records in parts, and keep the rows of each")
         self.equations = checked(model).equations()
-        self.by = [by] if isinstance(by, str) else list(by)
+        self.by = _keys(by)
         self.declared = declared({**self.equations.declared, **parameters}, named(self.equations.parameters, "parameters"))
         self.options = settings(self.equations, options)
         self.record = record
+        named_twice = _repeated(self._names())
+        if named_twice is not None:
+            raise Error(f"the result would have two columns `{named_twice}`; rename the parameter or the output that has this name")
         taken = [name for name in self.by if name in self.columns()]
         if taken:
             raise Error(f"the column `{taken[0]}` of by has the name of a column of the result; rename it")
@@ -59,8 +63,6 @@ class Plan:
 
     def _check(self) -> None:
         """Refuse what is wrong for all records, by one of two samples and a fleet of none."""
-        if self.record.sample_time is not None:
-            Frame({}).time(None, self.record.sample_time, 0)
         zeros = (np.zeros(2), False)
         columns = {column: zeros for _, column, _ in self._signals()}
         self.record.of(self.equations, "record", np.array([0.0, 1.0]), columns)
@@ -100,6 +102,8 @@ class Plan:
         needed = self.needed(names)
         signals = [column for _, column, _ in self._signals()]
         time = time_column(names if self.record.time else [name for name in names if name not in signals], self.record.time)
+        if time is None and self.record.time is None and INDEX in names:
+            time = INDEX
         if time is None and self.record.time is not None:
             raise Error(f"there is no column `{self.record.time}`; the frame has: {near(self.record.time, names)}")
         if time is None:
@@ -108,12 +112,13 @@ class Plan:
 
     def columns(self) -> dict[str, type]:
         """Give the columns of the result beside those of `by`, with the kind of their values."""
-        of: dict[str, type] = {"samples": int}
-        for name in named(self.equations.parameters, "parameters"):
-            of |= {name: float, f"{name}_error": float, f"{name}_lower": float, f"{name}_upper": float}
-        for name in named(self.equations.outputs, "outputs"):
-            of[f"{name}_rmse"] = float
-        return of | {"verdict": str, "outcome": str, "warnings": str, "reason": str}
+        words = {"samples": int, "verdict": str, "outcome": str, "warnings": str, "reason": str}
+        return {name: words.get(name, float) for name in self._names()}
+
+    def _names(self) -> list[str]:
+        parameters, outputs = named(self.equations.parameters, "parameters"), named(self.equations.outputs, "outputs")
+        numbers = [name + end for name in parameters for end in ("", "_error", "_lower", "_upper")]
+        return ["samples", *numbers, *(f"{name}_rmse" for name in outputs), "verdict", "outcome", "warnings", "reason"]
 
     def rows(self, data: Any, *, ordered: bool = False, progress: bool = False) -> dict[str, Any]:
         """Fit the records of a frame and give a row for each, in the order of their first samples.
@@ -134,15 +139,17 @@ class Plan:
         # Raises if one is missing.
         self.needed(frame.names)
         keys = [frame.values(name) for name in self.by]
-        places, firsts = _groups(keys)
-        of_record = {name: frame.rows(name, firsts) for name in self.by}
-        labels = [", ".join(map(str, one)) for one in zip(*(_list(key) for key in of_record.values()), strict=True)]
         columns = {column: frame.column(column, signal, unit) for signal, column, unit in self._signals()}
-        readonly = {name: is_readonly(column) for name, column in columns.items()}
         step = self.record.sample_time
         signals = [column for _, column, _ in self._signals()]
         # Beside a sample time, the times of a column are compared with it.
         times, what = frame.stamps(self.record.time, signals) if step is None else frame.beside(signals) or (None, "")
+        lengths = {f"column `{name}`": len(column) for name, column in [*zip(self.by, keys, strict=True), *columns.items()]}
+        _check_lengths(lengths if times is None else {**lengths, what: len(times)})
+        places, firsts = _groups(keys)
+        of_record = {name: frame.rows(name, firsts) for name in self.by}
+        labels = [", ".join(map(str, one)) for one in zip(*(_list(key) for key in of_record.values()), strict=True)]
+        readonly = {name: is_readonly(column) for name, column in columns.items()}
         records: list[_core.Record] = []
         failed: dict[int, str] = {}
         for k, rows in enumerate(places):
@@ -190,6 +197,27 @@ def _list(column: Any) -> list[Any]:
     return entries
 
 
+def _keys(by: Any) -> list[str]:
+    """Give the names of the columns that tell the records apart."""
+    several = list(by) if isinstance(by, Iterable) and not isinstance(by, str) else [by]
+    names = [column_name("by", one) for one in several]
+    if not names:
+        raise Error(f"by is {by!r}; name at least one column that tells the records apart")
+    return names
+
+
+def _repeated(names: Sequence[str]) -> str | None:
+    """Give a name that occurs twice, if there is one."""
+    return next((name for k, name in enumerate(names) if name in names[:k]), None)
+
+
+def _check_lengths(of: Mapping[str, int]) -> None:
+    first, *others = of
+    for name in others:
+        if of[name] != of[first]:
+            raise Error(f"{name} has {of[name]} rows, and {first} has {of[first]}; every sample needs both")
+
+
 #: The rows of one record: a part of the frame, or here and there.
 _Rows: TypeAlias = "slice | np.ndarray[Any, np.dtype[np.int64]]"
 
@@ -208,8 +236,7 @@ def _groups(keys: list[Any]) -> tuple[list[_Rows], Any]:
     starts = np.flatnonzero(new)
     codes: Any = None
     for key in keys:
-        own = key[starts]
-        _, inverse = np.unique(own.astype(str) if own.dtype == object else own, return_inverse=True)
+        inverse = _numbered(key[starts])
         if codes is not None:
             _, inverse = np.unique(codes * (int(inverse.max()) + 1) + inverse, return_inverse=True)
         codes = inverse
@@ -235,8 +262,25 @@ def _differs(key: Any) -> Any:
         return (key[1:] != key[:-1]).astype(bool)
     except TypeError:
         # pandas' NA, whose comparison is no answer.
-        key = key.astype(str)
+        key = _numbered(key)
         return key[1:] != key[:-1]
+
+
+def _numbered(key: Any) -> Any:
+    """Number the entries: equal ones alike, and text is never equal to a number."""
+    if key.dtype != object:
+        return np.unique(key, return_inverse=True)[1]
+    numbers: dict[Any, int] = {}
+    return np.array([numbers.setdefault(_hashable(one), len(numbers)) for one in key.tolist()], dtype=np.int64)
+
+
+def _hashable(entry: Any) -> Any:
+    """Give an entry, or its text where it equals not even itself, as what is missing, or has no hash."""
+    try:
+        hash(entry)
+        return entry if entry == entry else (None, str(entry))
+    except (TypeError, ValueError):
+        return None, str(entry)
 
 
 def plan(

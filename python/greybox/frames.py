@@ -10,10 +10,14 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from greybox import _core
+from greybox.checks import column_name, mapping, number
 from greybox.errors import Error, RecordWarning, in_python, warn
 from greybox.signals import near
 
-__all__ = ["Array", "Frame", "Kind", "has_times", "is_readonly", "place", "rename", "seconds", "steps", "time_column"]
+__all__ = [
+    "INDEX", "Array", "Frame", "Kind", "has_times", "is_readonly", "joined", "named_columns", "place", "positive_time", "rename", "seconds", "steps",
+    "time_column",
+]  # fmt: skip
 
 Array: TypeAlias = "np.ndarray[Any, np.dtype[np.float64]]"
 
@@ -25,6 +29,9 @@ _SAME = 0.01
 
 #: Units of numbers that count from 1970.
 _SINCE_1970 = {1e-3: "milliseconds", 1e-6: "microseconds", 1e-9: "nanoseconds"}
+
+#: How files and tables of Arrow call the index of a pandas frame that has no name.
+INDEX = "__index_level_0__"
 
 _TIMES = ("t", "time", "Time", "TIME", "timestamp", "Timestamp")
 
@@ -45,16 +52,17 @@ class Frame:
             self._arrays = data
         else:
             self._frame = _narwhals(data)
+        # Of an xarray dataset, coordinates are columns, too.
+        names = self._frame.columns if self._arrays is None else [*self._arrays, *getattr(self._arrays, "coords", ())]
+        #: What the frame calls its columns, also by numbers, by their names as text.
+        self._called = _called(names)
         #: The index of a pandas frame, where it says more than the rows' numbers.
         self.index = _index(data)
 
     @property
     def names(self) -> list[str]:
         """Names of the columns."""
-        if self._arrays is not None:
-            # Of an xarray dataset, coordinates are columns, too.
-            return list(dict.fromkeys([*map(str, self._arrays), *map(str, getattr(self._arrays, "coords", ()))]))
-        return list(map(str, self._frame.columns))
+        return list(self._called)
 
     @property
     def kind(self) -> Kind:
@@ -82,14 +90,14 @@ class Frame:
             hint = f'; name another by columns={{"{signal}": "..."}}'
             raise Error(f"there is no column `{name}`{renamed}; the frame has: {near(name, self.names)}{hint}")
         if self._arrays is None:
-            return _numbers(self._frame.get_column(found), found)
-        return _array_numbers(self._arrays[found], found)
+            return _numbers(self._frame.get_column(self._called[found]), found)
+        return _array_numbers(self._arrays[self._called[found]], found)
 
     def values(self, name: str) -> Any:
         """Give a column as it is."""
         if self._arrays is not None:
-            return np.asarray(self._arrays[name])
-        column = self._frame.get_column(name)
+            return _entries(self._arrays[self._called[name]], name)
+        column = self._frame.get_column(self._called[name])
         if column.dtype.is_integer() and column.null_count():
             # As floating-point numbers large ones would be rounded.
             return np.array(column.to_list(), dtype=object)
@@ -98,11 +106,11 @@ class Frame:
     def rows(self, name: str, rows: Any) -> Any:
         """Give some rows of a column as the frame has it, with its zone where it has one."""
         if self._arrays is not None:
-            return np.asarray(self._arrays[name])[rows]
+            return self.values(name)[rows]
         import narwhals as nw
 
         # The index of pandas has the places of the rows in the frame.
-        return nw.maybe_reset_index(self._frame.get_column(name)[rows]).to_native()
+        return nw.maybe_reset_index(self._frame.get_column(self._called[name])[rows]).to_native()
 
     def time(self, name: str | None, sample_time: float | None, rows: int, signals: Collection[str] = ()) -> Array:
         """Give the time of each row in seconds; of dates, since the first. Columns of `signals` are the time only where `name` says so.
@@ -114,15 +122,19 @@ class Frame:
         """
         if sample_time is None:
             return seconds(*self.stamps(name, signals))
-        if not (np.isfinite(sample_time) and sample_time > 0.0):
-            raise Error(f"the sample time is {sample_time!r}; it must be positive and finite (s)")
         beside = self.beside(signals)
-        return steps(float(sample_time), rows, None if beside is None else (seconds(*beside), beside[1]))
+        return steps(sample_time, rows, None if beside is None else (seconds(*beside), beside[1]))
 
     def beside(self, signals: Collection[str]) -> tuple[Any, str] | None:
         """Give the time of a column that is no signal's, beside a sample time."""
         found = time_column([one for one in self.names if one not in signals])
         return None if found is None else self.stamps(found)
+
+    def _stored_index(self) -> str | None:
+        """Give the column of a table that is an index of pandas without a name, unless it counts the rows."""
+        if self._frame is None or INDEX not in self or self._frame.get_column(INDEX).dtype.is_integer():
+            return None
+        return INDEX
 
     def stamps(self, name: str | None, signals: Collection[str] = ()) -> tuple[Any, str]:
         """Give the time of each row as it stands, in seconds or as a duration in nanoseconds, and where it stands.
@@ -135,6 +147,8 @@ class Frame:
         index = None if getattr(self.index, "name", None) is None else str(self.index.name)
         found = time_column([one for one in self.names if one not in signals] if name is None else self.names, name)
         if found is None and name is None and self.index is None:
+            found = self._stored_index()
+        if found is None and name is None and self.index is None:
             raise Error(
                 f"there is no column `t` or `time`, and no index of times; the frame has: {near('t', self.names)}. Name the column "
                 'by time="...", or give the time between samples (s) by sample_time=...'
@@ -146,10 +160,24 @@ class Frame:
             raise Error(f"there is no column `{name}` for the time; the frame has: {near(str(name), self.names)}")
         what = f"column `{found}`"
         if self._arrays is not None:
-            return _counted(_stamps(self._arrays[found], what), found), what
-        column = self._frame.get_column(found)
+            return _counted(_stamps(self._arrays[self._called[found]], what), found), what
+        column = self._frame.get_column(self._called[found])
         dated = _dated(column)
         return (_counted(_stamps(column.to_numpy(), what), found) if dated is None else dated), what
+
+
+def positive_time(given: Any) -> float:
+    """Give a time between samples.
+
+    Raises
+    ------
+    Error
+        If it is not positive and finite.
+    """
+    sample_time = number("sample_time", given)
+    if not (np.isfinite(sample_time) and sample_time > 0.0):
+        raise Error(f"the sample time is {sample_time!r}; it must be positive and finite (s)")
+    return sample_time
 
 
 def steps(sample_time: float, rows: int, beside: tuple[Array, str] | None) -> Array:
@@ -202,7 +230,7 @@ def _counted(stamps: Any, name: str) -> Any:
     """
     if stamps.dtype.kind == "m":
         return stamps
-    header = _core.Header([name])
+    header = _core.Header(["t" if name == INDEX else name])
     try:
         unit, origin = header.seconds(0, float(stamps[0]) if len(stamps) else 0.0)
         named, _ = header.seconds(0, 1.0)
@@ -299,9 +327,37 @@ def _no_numbers(name: str, value: Any, kind: str) -> Error:
     return Error(f"column `{name}` has {value!r} ({kind}), which is no number{hint}")
 
 
+def _called(names: Iterable[Any]) -> dict[str, Any]:
+    """Give the names of columns, which may be numbers, by what they are as text."""
+    found: dict[str, Any] = {}
+    for name in names:
+        other = found.setdefault(str(name), name)
+        if other != name:
+            raise Error(f"the frame has two columns `{name}`, {other!r} and {name!r}; rename one")
+    return found
+
+
+def _entries(values: Any, name: str) -> Any:
+    """Give a column of any kind of entries as an array."""
+    array = _as_array(values, f"column `{name}`")
+    # Of numbers beside text, NumPy makes text.
+    mixed = array.dtype.kind == "U" and isinstance(values, (list, tuple)) and not all(isinstance(one, str) for one in values)
+    array = np.array(values, dtype=object) if mixed else array
+    if array.ndim != 1:
+        raise Error(f"column `{name}` has the shape {array.shape}; give one entry per sample")
+    return array
+
+
+def _as_array(values: Any, what: str) -> Any:
+    try:
+        return np.asarray(values)
+    except ValueError as error:
+        raise Error(f"{what} is no array: {error}") from None
+
+
 def _array_numbers(values: Any, name: str) -> Array:
     masked = isinstance(values, np.ma.MaskedArray) and values.dtype.kind in "fiub"
-    array = np.ma.filled(values.astype(np.float64), np.nan) if masked else np.asarray(values)
+    array = np.ma.filled(values.astype(np.float64), np.nan) if masked else _as_array(values, f"column `{name}`")
     if array.ndim != 1:
         raise Error(f"column `{name}` has the shape {array.shape}; give one number per sample")
     if array.dtype.kind not in "fiub":
@@ -309,7 +365,7 @@ def _array_numbers(values: Any, name: str) -> Array:
             if array.dtype.kind != "O":
                 raise TypeError
             return np.array([np.nan if one is None else float(one) for one in array.tolist() if not isinstance(one, str) or _refuse(one)])
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             bad = next((one for one in array.tolist() if not isinstance(one, (int, float))), array[:1].tolist())
             raise _no_numbers(name, bad, str(array.dtype)) from None
     return np.ascontiguousarray(array, dtype=np.float64)
@@ -323,7 +379,7 @@ def _stamps(values: Any, what: str) -> Any:
     """Give times as they stand: numbers (s), or durations since an instant (ns)."""
     if getattr(values, "tz", None) is not None:
         values = values.tz_convert("UTC").tz_localize(None)
-    array = np.asarray(values)
+    array = _as_array(values, what)
     if array.ndim != 1:
         raise Error(f"{what} has the shape {array.shape}; give one time per sample")
     if array.dtype.kind in "mM":
@@ -376,6 +432,34 @@ def is_readonly(array: Array) -> bool:
     return owner is not None and not shared
 
 
+def named_columns(given: Any) -> dict[str, str]:
+    """Give what is said of the columns of signals, as text.
+
+    Raises
+    ------
+    Error
+        If it is no mapping to names of columns.
+    """
+    each = mapping("columns", given, 'the column of each signal that has another name: {"signal": "column"}')
+    return {str(signal): column_name(f"the column of `{signal}`", column) for signal, column in each.items()}
+
+
+def joined(columns: Iterable[tuple[str, Any]]) -> dict[str, Any]:
+    """Give columns by their names; one that occurs again is the same.
+
+    Raises
+    ------
+    Error
+        If two of one name have other values.
+    """
+    found: dict[str, Any] = {}
+    for name, column in columns:
+        if name in found and not np.array_equal(found[name], column, equal_nan=found[name].dtype.kind == "f"):
+            raise Error(f"the table would have two columns `{name}` of other values; rename the signal of the model that has this name")
+        found[name] = column
+    return found
+
+
 def rename(names: Iterable[str], columns: Mapping[str, str] | None) -> dict[str, str]:
     """Give the column of each signal.
 
@@ -385,8 +469,6 @@ def rename(names: Iterable[str], columns: Mapping[str, str] | None) -> dict[str,
         If a signal is renamed that the model does not have.
     """
     of = {name: name for name in names}
-    if not isinstance(columns or {}, Mapping):
-        raise Error(f'columns is {columns!r}; give the column of each signal that has another name: {{"signal": "column"}}')
     for signal, column in (columns or {}).items():
         if signal not in of:
             raise Error(f"columns names `{signal}`, which is no input or output of the model; it has: {near(signal, of)}")

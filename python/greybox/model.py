@@ -10,11 +10,15 @@ import numpy as np
 
 from greybox import _core
 from greybox._core import Parameter
+from greybox.checks import shown
 from greybox.errors import Error
 from greybox.signals import Signals, SignalsLike, Vector, in_order, named
-from greybox.symbols import Number, Symbol, Trace
+from greybox.symbols import Number, Symbol, Trace, called
 
 __all__ = ["Equations", "Model", "model"]
+
+#: What the arguments of a function are called.
+_LETTERS = {"input": "u", "measured": "y", "parameter": "p"}
 
 #: What a model's function returns: a vector, or a number for each quantity by name or in order.
 Returned: TypeAlias = "Vector | Mapping[str, Number] | Sequence[Number] | np.ndarray[Any, np.dtype[Any]]"
@@ -262,6 +266,9 @@ def _read(of: Model) -> Equations:
     kind = "continuous" if derivative else "discrete" if following else "static"
     if kind == "static" and quantities["states"]:
         raise Error(f"{title} has states and neither derivative(t, x, u, p) nor next(t, x, u, p); write one")
+    initial = [f"{name}(0)" for name in quantities["states"] if f"{name}(0)" in quantities["parameters"]]
+    if initial:
+        raise Error(f"{title} has the parameter `{initial[0]}`, which is the name of the state at the first sample; rename the parameter")
     if not quantities["outputs"]:
         raise Error(f"{title} has no outputs; declare what is measured: outputs = gb.signals(name=\"unit\")")
     trace = Trace()
@@ -294,12 +301,8 @@ def _roots(
     def nodes(role: str, function: Callable[..., Returned] | None, name: str, *args: Any) -> list[_core.Node]:
         if function is None:
             return []
-        try:
-            inspect.signature(function).bind(*args)
-        except TypeError as error:
-            given = {1: "p", 2: "u, p"}.get(len(args), "t, x, u, p")
-            raise Error(f"{name} of {title} cannot be called with ({given}), which are handed over: {error}") from None
-        return _returned(trace, function(*args), tuple(quantities[role]), f"{name} of {title}")
+        _check_call(function, f"{name} of {title}", {1: "p", 2: "u, p"}.get(len(args), "t, x, u, p"))
+        return _returned(trace, called(function, *args), tuple(quantities[role]), f"{name} of {title}")
 
     name = "derivative" if _written(of, "derivative") else "next"
     return [
@@ -311,6 +314,16 @@ def _roots(
         nodes("inputs", _written(of, "delay"), "delay", p),
         nodes("states", _written(of, "jump"), "jump", t, x, u, p),
     ]
+
+
+def _check_call(function: Any, what: str, given: str) -> None:
+    """Refuse what cannot be called with the arguments of these names."""
+    if not callable(function):
+        raise Error(f"{what} is {shown(function)}; give a function of {given}")
+    try:
+        inspect.signature(function).bind(*given.split(", "))
+    except (TypeError, ValueError) as error:
+        raise Error(f"{what} cannot be called with ({given}), which are handed over: {error}") from None
 
 
 def _returned(trace: Trace, found: Any, names: tuple[str, ...], where: str) -> list[_core.Node]:
@@ -350,13 +363,14 @@ def of_parameters(equations: Equations, function: Callable[..., Any]) -> _core.E
 def _expression(
     function: Callable[..., Any], what: str, equations: Equations, roles: list[tuple[str, str]], *, time: bool
 ) -> _core.Expression:
+    _check_call(function, what, ", ".join([*(["t"] if time else []), *(_LETTERS[leaf] for _, leaf in roles)]))
     trace = Trace()
     arguments: list[Any] = [Symbol(trace, trace.graph.time())] if time else []
     for role, leaf in roles:
         names = named(getattr(equations, role), role)
         arguments.append(Vector(role, names, [Symbol(trace, getattr(trace.graph, leaf)(i)) for i in range(len(names))]))
     try:
-        (node,) = _returned(trace, function(*arguments), ("value",), what)
+        (node,) = _returned(trace, called(function, *arguments), ("value",), what)
         return _core.Expression(trace.graph, node)
     finally:
         trace.open = False

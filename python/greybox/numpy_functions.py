@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import reduce
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from greybox import _core
+from greybox.checks import number
 from greybox.errors import Error
 from greybox.signals import Vector
 from greybox.symbols import (
     Condition,
     Symbol,
+    Symbols,
     common,
     compared,
     each,
@@ -28,7 +31,7 @@ from greybox.symbols import (
     where,
 )
 
-__all__ = ["METHODS", "interp", "interp2", "of_arrays", "of_conditions", "of_symbols"]
+__all__ = ["METHODS", "interp", "interp2", "is_special", "of_arrays", "of_conditions", "of_entries", "of_symbols"]
 
 #: The library's name of each function of one number.
 _NAMES = {
@@ -97,6 +100,13 @@ _LOGICAL: dict[str, Callable[..., Any]] = {
     "invert": lambda a: ~a,
 }
 
+#: Ufuncs that NumPy computes by the operators of the entries, and those of two entries that reduce an array.
+_OPERATORS = {"add", "subtract", "multiply", "divide", "negative", "positive", "absolute", "power", "floor_divide", "remainder", "matmul"}
+_REDUCED = {"maximum", "minimum", "logical_and", "logical_or"}
+
+#: Functions that are computed here also of arrays of symbols alone.
+_SPECIAL = {"where", "clip", "interp", "select"}
+
 #: Functions that put arrays together or add up products, which NumPy computes by the operators of the entries.
 _BY_ENTRIES = {
     "stack", "concatenate", "hstack", "vstack", "column_stack", "dstack", "atleast_1d", "atleast_2d", "dot", "vdot", "inner", "outer",
@@ -109,20 +119,63 @@ def of_symbols(ufunc: np.ufunc, method: str, inputs: tuple[Any, ...], kwargs: di
     """Apply a ufunc of which an operand is a symbol."""
     name = ufunc.__name__
     if kwargs.get("out") is not None:
-        refuse(f"np.{name} with out=, or an operator such as +=, writes symbols into an array of floats; write a = a + b")
+        return _written(ufunc, method, inputs, kwargs)
     if method != "__call__" or kwargs:
         refuse(f"np.{name}.{method} and the options of np.{name} are not known for symbols; call np.{name}(...) alone")
     if name == "matmul":
-        return np.matmul(*(plain(one) for one in inputs))
+        return of_entries(ufunc, method, inputs, kwargs)
     if name == "clip":
         return each(_clip, *inputs)
-    known = (_UNARY if ufunc.nin == 1 else _BINARY).get(name)
+    return each(_of_entry(ufunc), *inputs)
+
+
+def _of_entry(ufunc: np.ufunc) -> Callable[..., Any]:
+    """Give what a ufunc is for single symbols, and for numbers that stand beside them in an array."""
+    name = ufunc.__name__
+    known = (_UNARY if ufunc.nin == 1 else _BINARY).get(name) or _LOGICAL.get(name)
     if known is None:
         refuse(
             f"np.{name} is not known for symbols; write it by + - * / **, gb.where and functions with slopes such as np.sqrt, np.exp, "
             "np.sin, np.tanh or np.hypot"
         )
-    return each(known, *inputs)
+
+    def of_entry(*entries: Any) -> Any:
+        symbolic = any(isinstance(one, (Symbol, Condition)) for one in entries)
+        return _logical(known, entries) if symbolic else ufunc(*entries)
+
+    return of_entry
+
+
+def _written(ufunc: np.ufunc, method: str, inputs: tuple[Any, ...], kwargs: dict[str, Any]) -> Any:
+    """Apply a ufunc and write the result into an array of objects, as ``a += b`` does."""
+    (out,) = kwargs["out"]
+    if out.dtype != object:
+        refuse(f"np.{ufunc.__name__} with out=, or an operator such as +=, writes symbols into an array of floats; write a = a + b")
+    rest = {name: one for name, one in kwargs.items() if name != "out"}
+    out[...] = getattr(ufunc, method)(*inputs, **rest)
+    return out
+
+
+def of_entries(ufunc: np.ufunc, method: str, inputs: tuple[Any, ...], kwargs: dict[str, Any]) -> Any:
+    """Apply a ufunc of which an operand is an array of symbols."""
+    name = ufunc.__name__
+    if kwargs.get("out") is not None:
+        return _written(ufunc, method, inputs, kwargs)
+    if name in _OPERATORS:
+        found = getattr(ufunc, method)(*(plain(one) for one in inputs), **kwargs)
+        return found.view(Symbols) if isinstance(found, np.ndarray) else found
+    if method == "reduce" and name in _REDUCED:
+        return _reduced(ufunc, *inputs, **kwargs)
+    return of_symbols(ufunc, method, inputs, kwargs)
+
+
+def _reduced(ufunc: np.ufunc, array: Any, axis: Any = 0, dtype: Any = None, **options: Any) -> Any:
+    """Reduce an array along one axis, or without one over all entries."""
+    said = {name for name, value in options.items() if value is not {"keepdims": False, "where": True}.get(name)}
+    if said or isinstance(axis, tuple):
+        refuse(f"np.{ufunc.__name__}.reduce with options or several axes is not known for symbols; give one axis alone")
+    entries = array.ravel() if axis is None else np.moveaxis(array, axis, 0)
+    return reduce(lambda a, b: each(_of_entry(ufunc), a, b), entries)
 
 
 def of_conditions(ufunc: np.ufunc, method: str, inputs: tuple[Any, ...], kwargs: dict[str, Any]) -> Any:
@@ -135,6 +188,11 @@ def of_conditions(ufunc: np.ufunc, method: str, inputs: tuple[Any, ...], kwargs:
 
 def _logical(known: Callable[..., Any], inputs: tuple[Any, ...]) -> Any:
     return known(*(bool(one) if isinstance(one, np.bool_) else one for one in inputs))
+
+
+def is_special(function: Any) -> bool:
+    """Whether a function of arrays is computed by :func:`of_arrays`, and not by the operators of the entries."""
+    return function.__name__ in _SPECIAL
 
 
 def of_arrays(function: Any, args: tuple[Any, ...], kwargs: dict[str, Any]) -> Any:
@@ -153,7 +211,9 @@ def of_arrays(function: Any, args: tuple[Any, ...], kwargs: dict[str, Any]) -> A
         if args and (isinstance(args[0], Vector) or (isinstance(args[0], np.ndarray) and args[0].dtype == object)):
             args = ([*args[0]], *args[1:])
         result = function(*(_arrays(one) for one in args), **{key: _arrays(one) for key, one in kwargs.items()})
-        return result.item() if isinstance(result, np.ndarray) and result.ndim == 0 else result
+        if not isinstance(result, np.ndarray):
+            return result
+        return result.item() if result.ndim == 0 else result.view(Symbols)
     refuse(f"np.{name} is not known for symbols; write it by + - * / **, np.where and functions such as np.sqrt, np.exp or np.sin")
 
 
@@ -173,8 +233,11 @@ def _three(a: Any, a_min: Any = None, a_max: Any = None, **kwargs: Any) -> tuple
 
 
 def _clip(a: Any, low: Any, high: Any) -> Any:
+    if low is not None and high is not None and not isinstance(low, Symbol) and not isinstance(high, Symbol) and low > high:
+        ends = f"{float(low)!r} as its lower end and {float(high)!r} as its upper one"
+        refuse(f"np.clip has {ends}, which is then the result everywhere; exchange them")
     above = a if low is None else where(a < low, low, a)
-    return above if high is None else where(high < a, high, above)
+    return above if high is None else where(high < above, high, above)
 
 
 def _select(condlist: Sequence[Any], choicelist: Sequence[Any], default: Any = 0.0) -> Any:
@@ -204,12 +267,12 @@ def _floats(what: str, values: ArrayLike) -> list[float]:
     array = plain(values)
     if array.dtype == object:
         refuse(f"{what} of a table is made of symbols; a table has fixed numbers")
-    return [float(one) for one in array.ravel()]
+    return [number(f"a number of {what} of a table", one) for one in array.ravel()]
 
 
 def _look_up(table: _core.Table, x: Any, y: Any) -> Any:
     if not isinstance(x, Symbol) and not isinstance(y, Symbol):
-        return table.at(float(x), float(y))
+        return table.at(number("what is looked up", x), number("what is looked up", y))
     trace = common(x, y)
     return Symbol(trace, trace.graph.table(table, trace.node(x), trace.node(y)))
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from greybox._core import Parameter
+from greybox.checks import flag, mapping, number, shown
 from greybox.errors import Error
-from greybox.signals import Signals, near
+from greybox.model import Equations
+from greybox.signals import Signals, distinct, named, near
 
 __all__ = ["Parameter", "fixed", "free"]
 
@@ -44,12 +46,23 @@ def free(
     >>> gb.free(1.0, within=(0.01, 10))
     free(1.0, within=(0.01, 10.0))
     """
-    return Parameter(start, True, within, prior, log, positive, per_experiment)
+    flags = (flag("log", log), flag("positive", positive), flag("per_experiment", per_experiment))
+    return Parameter(number("start", start), True, _pair("within", within), _pair("prior", prior), *flags)
 
 
 def fixed(value: float) -> Parameter:
     """Declare a quantity that keeps its value."""
-    return Parameter(value, False)
+    return Parameter(number("the value of gb.fixed", value), False)
+
+
+def _pair(what: str, given: Any) -> tuple[float, float] | None:
+    if given is None:
+        return None
+    try:
+        first, second = given
+    except (TypeError, ValueError):
+        raise Error(f"{what} is {shown(given)}; give two numbers: {what}=(0.1, 10.0)") from None
+    return number(f"the first number of {what}", first), number(f"the second number of {what}", second)
 
 
 def declared(given: Mapping[str, Any], names: Signals, what: str = "parameter") -> list[Parameter]:
@@ -76,13 +89,13 @@ def said(given: Mapping[str, Any], names: Signals, what: str) -> list[Parameter 
         If one is unknown, or not declared by :func:`free` or :func:`fixed`.
     """
     if not isinstance(given, Mapping):
-        raise Error(f"{what} {given!r}: give the declaration of each by its name")
+        raise Error(f"{what} {shown(given)}: give the declaration of each by its name")
     for name, value in given.items():
         if name not in names:
             raise Error(f"there is no {what} `{name}`; the model has: {near(name, names)}")
         if not isinstance(value, Parameter):
-            shown = f"{value!r}" if isinstance(value, (int, float)) else type(value).__name__
-            raise Error(f"{what} `{name}` is {shown}; write gb.free({shown}) to estimate it from there, or gb.fixed({shown}) to keep it")
+            told = f"{value!r}" if isinstance(value, (int, float)) else type(value).__name__
+            raise Error(f"{what} `{name}` is {told}; write gb.free({told}) to estimate it from there, or gb.fixed({told}) to keep it")
     return [given.get(name) for name in names]
 
 
@@ -94,7 +107,7 @@ def together(parameters: Mapping[str, Parameter] | None, by_name: Mapping[str, P
     Error
         If a parameter is declared twice, or what stands by name is no declaration.
     """
-    given = dict(parameters or {})
+    given = dict(mapping("parameters", parameters, "the declaration of each by its name"))
     for name, value in by_name.items():
         if name in given:
             raise Error(f"parameter `{name}` is declared twice, in parameters and by name; leave one out")
@@ -102,3 +115,20 @@ def together(parameters: Mapping[str, Parameter] | None, by_name: Mapping[str, P
             raise Error(f"there is no option `{name}`, and {type(value).__name__} declares no parameter; options are: {near(name, options)}")
         given[name] = value
     return given
+
+
+def check_labels(of: Equations, given: Sequence[Parameter], records: Sequence[str]) -> None:
+    """Refuse parameters with the name that an unknown of one of several records has: its own parameter, or its initial state.
+
+    Raises
+    ------
+    Error
+        If there is one.
+    """
+    parameters = named(of.parameters, "parameters")
+    own = [name for name, one in zip(parameters, given, strict=True) if one.per_experiment]
+    initial = [f"{name}(0)" for name in named(of.states, "states")]
+    labels = {f"{name} [{record}]" for name in [*own, *initial] for record in distinct(records)} if len(records) > 1 else set[str]()
+    for name in parameters:
+        if name in labels:
+            raise Error(f"parameter `{name}` has the name of an unknown of one record; rename the parameter, or give gb.Record another name")

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from greybox import _core
+from greybox.checks import whole
 from greybox.model import Equations
-from greybox.options import whole
 
 __all__ = ["surface"]
 

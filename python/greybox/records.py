@@ -11,9 +11,10 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 
 from greybox import _core
+from greybox.checks import column_name, mapping, text
 from greybox.errors import Error, in_python
 from greybox.files import TEXT, read
-from greybox.frames import Array, Frame, Kind, is_readonly, place, rename
+from greybox.frames import Array, Frame, Kind, is_readonly, named_columns, place, positive_time, rename
 from greybox.model import Equations
 from greybox.parameters import Parameter, said
 from greybox.signals import Signals, named
@@ -36,13 +37,14 @@ class Record:
     data : frame
         pandas, polars, Arrow (or whatever hands over an Arrow stream), a mapping from names to arrays, an xarray dataset, or a
         structured array. A row for each sample, a column for each signal, of its name, with a unit behind it or without (``u [V]``); a known
-        unit that is not the signal's is refused; further columns are ignored. Or the path of a file: of text with columns (``.csv``), in
-        which what is not said is found, or of a kind that :func:`greybox.read` reads.
+        unit that is not the signal's is refused; further columns are ignored. Numbers as names count as their text. Or the path of a file:
+        of text with columns (``.csv``), in which what is not said is found, or of a kind that :func:`greybox.read` reads.
     name : str, optional
         The name in reports and errors; without it that of the file, without its ending.
     time : str, optional
         The column of the time: dates, which count from the first, or numbers in seconds or in the unit that its name says (``t [ms]``,
-        ``time_ms``). Without it, the column ``t`` or ``time`` that is no signal's, with a unit or without, or else the index of a pandas frame.
+        ``time_ms``). Without it, the column ``t`` or ``time`` that is no signal's, with a unit or without, or else the index of a pandas frame; of
+        one without a name also in the table of Arrow, or the file, that it was written to.
     sample_time : float, optional
         The time between samples (s), where there is no column.
     columns : mapping from str to str, optional
@@ -58,7 +60,8 @@ class Record:
     Raises
     ------
     Error
-        If two of `time`, `sample_time` and `columns` of ``t`` are given, or `sample_time` beside a column of another time.
+        If two of `time`, `sample_time` and `columns` of ``t`` are given, `sample_time` beside a column of another time, or something of
+        another kind than it has to be.
     """
 
     data: Any
@@ -70,9 +73,18 @@ class Record:
     initial: Initial | None = None
 
     def __post_init__(self) -> None:
+        checked: dict[str, Any] = {
+            "name": text("the name of the record", self.name),
+            "time": None if self.time is None else column_name("time", self.time),
+            "sample_time": None if self.sample_time is None else positive_time(self.sample_time),
+            "columns": None if self.columns is None else named_columns(self.columns),
+        }
+        for name, value in checked.items():
+            # A frozen class sets its fields in no other way.
+            object.__setattr__(self, name, value)
         if self.time is not None and self.sample_time is not None:
             raise Error(f"time={self.time!r} and sample_time={self.sample_time!r} both give the time of the samples; leave one out")
-        if isinstance(self.columns, Mapping) and "t" in self.columns:
+        if self.columns is not None and "t" in self.columns:
             for name, given in (("time", self.time), ("sample_time", self.sample_time)):
                 if given is not None:
                     both = f"columns={{'t': {self.columns['t']!r}}} and {name}={given!r}"
@@ -119,10 +131,9 @@ class Record:
 
     def _said(self, equations: Equations, record: _core.Record) -> _core.Record:
         # A mapping of nothing says nothing.
-        given = None if self.initial == {} else self.initial
+        given = None if isinstance(self.initial, Mapping) and not self.initial else self.initial
         initial = given if given is None or isinstance(given, str) else said(given, _states(equations), "initial state of")
-        hold = self.hold if self.hold is None or isinstance(self.hold, str) else dict(self.hold)
-        return equations.prepared(record).said(hold, initial)
+        return equations.prepared(record).said(_holds(self.hold), initial)
 
 
 def opened(data: Any) -> Any:
@@ -146,6 +157,13 @@ def framed(data: Any) -> Any:
 def kind_of(data: Any) -> Kind:
     """Give what makes a frame of the same kind; dicts where the data are a path."""
     return dict if is_path(data) else Frame(data).kind
+
+
+def _holds(hold: Any) -> str | dict[str, str] | None:
+    if hold is None or isinstance(hold, str):
+        return hold
+    each = dict(mapping("hold", hold, '"zero", "first", or one of them for each input by its name'))
+    return {str(name): text(f"hold of `{name}`", one) or "" for name, one in each.items()}
 
 
 def _states(equations: Equations) -> Signals:

@@ -12,11 +12,11 @@ import numpy as np
 
 from greybox import _core
 from greybox.bootstrap import Bootstrap
+from greybox.checks import number, text, whole
 from greybox.errors import Error, FitWarning, RecordWarning, warn
 from greybox.estimate import Estimate
-from greybox.frames import Array, Kind
+from greybox.frames import Array, Kind, joined
 from greybox.model import Equations
-from greybox.options import whole
 from greybox.parameters import Parameter
 from greybox.process_noise import ProcessNoise
 from greybox.profile import Profile
@@ -96,16 +96,23 @@ class Fit(Estimate):
         """Give time, inputs, outputs, and for each output its prediction and residual: ``id``, ``id_predicted``, ``id_residual``.
 
         A frame of the caller's kind, a row for each sample. The arguments are those of :meth:`predict`.
+
+        Raises
+        ------
+        Error
+            If two columns would have one name, such as that of an input ``id_predicted``.
         """
         return self._predicted(data, said, self._all)
 
     def _all(self, record: _core.Record, predicted: dict[str, Array], errors: dict[str, Array]) -> dict[str, Array]:
-        return {
-            **dict(zip(named(self._equations.inputs, "inputs"), record.inputs(), strict=True)),
-            **dict(zip(predicted, record.outputs(), strict=True)),
-            **{f"{name}_predicted": column for name, column in predicted.items()},
-            **{f"{name}_residual": column for name, column in errors.items()},
-        }
+        return joined(
+            [
+                *zip(named(self._equations.inputs, "inputs"), record.inputs(), strict=True),
+                *zip(predicted, record.outputs(), strict=True),
+                *((f"{name}_predicted", column) for name, column in predicted.items()),
+                *((f"{name}_residual", column) for name, column in errors.items()),
+            ]
+        )
 
     def filtered(self, data: Any = None, /, **said: Any) -> Any:
         """Give the states of a record after each sample's measurements, by the fit's Kalman filter.
@@ -139,8 +146,8 @@ class Fit(Estimate):
         parts: list[dict[str, Array]] = []
         for k, core in enumerate(cores):
             means, deviations = self._problem.states(self._estimate, core, k if data is None else None, smoothed)
-            spreads = {f"{name}_deviation": one for name, one in zip(states, deviations, strict=True)}
-            parts.append(dict(zip(states, means, strict=True)) | spreads)
+            spreads = ((f"{name}_deviation", one) for name, one in zip(states, deviations, strict=True))
+            parts.append(joined([*zip(states, means, strict=True), *spreads]))
         return self._as(data)(_stacked(cores, parts))
 
     def _asked(self, data: Any, said: Mapping[str, Any]) -> list[_core.Record]:
@@ -182,7 +189,7 @@ class Fit(Estimate):
         """
 
         def columns(k: int) -> dict[str, Array]:
-            confidence, prediction = self._problem.bands(self._estimate, k, probability)
+            confidence, prediction = self._problem.bands(self._estimate, k, number("probability", probability))
             names = named(self._equations.outputs, "outputs")
             named_ = {f"{name}_confidence": one for name, one in zip(names, confidence, strict=True)}
             return named_ | {f"{name}_prediction": one for name, one in zip(names, prediction, strict=True)}
@@ -200,8 +207,9 @@ class Fit(Estimate):
         Error
             If no unknown has the name.
         """
-        if name not in self.unknowns:
+        if text("name", name) not in self.unknowns:
             raise Error(f"there is no unknown `{name}`; the fit has: {near(name, self.unknowns)}")
+        probability = number("probability", probability)
         return Profile(name, probability, self._kind, self._problem.profile(self._estimate, name, probability))
 
     def process_noise(self) -> ProcessNoise:
@@ -244,7 +252,7 @@ class Fit(Estimate):
             If the time limit of the fit ended it after fewer refits, or single residuals were drawn though they are colored. Ctrl-C ends it without
             a result.
         """
-        count, seed = whole("count", count, 1), whole("seed", seed, 0)
+        count, seed = whole("count", count, 1), whole("seed", seed, 0, 2**64 - 1)
         blocks = None if blocks is None else whole("blocks", blocks, 0)
         with Progress(progress, "bootstrap", count) as shown:
             found = self._problem.bootstrap(self._estimate, blocks, count, seed, shown)
@@ -285,7 +293,7 @@ class Fit(Estimate):
         """
         made = self._problem.report(self._estimate)
         drawn = None if bootstrap is None else bootstrap.to_json()
-        report = Report(made.extended(title, [self.profile(name).to_json() for name in profiles], drawn))
+        report = Report(made.extended(text("title", title), [self.profile(name).to_json() for name in profiles], drawn))
         if path is not None:
             report.save(path)
         return report
@@ -326,6 +334,6 @@ def _framed(data: Any) -> Any:
 def _stacked(records: list[_core.Record], parts: list[dict[str, Array]]) -> dict[str, Any]:
     """Give the columns of all records, one below the other, with the time, and with the record's name where there are several."""
     names = distinct([core.name for core in records])
-    labels = {"record": np.repeat(names, [len(core) for core in records])} if len(records) > 1 else {}
-    columns = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
-    return {**labels, "t": np.concatenate([core.time() for core in records]), **columns}
+    labels = [("record", np.repeat(names, [len(core) for core in records]))] if len(records) > 1 else []
+    columns = ((name, np.concatenate([part[name] for part in parts])) for name in parts[0])
+    return joined([*labels, ("t", np.concatenate([core.time() for core in records])), *columns])

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import difflib
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, TypeAlias
 
 import numpy as np
 
 from greybox.errors import Error
-from greybox.symbols import refuse
+from greybox.symbols import Symbols, refuse
 
 __all__ = ["Signals", "Values", "Vector", "distinct", "named", "near", "signals"]
 
@@ -90,7 +90,7 @@ def named(of: SignalsLike, what: str) -> Signals:
         return Signals(of)
     if isinstance(of, str):
         raise Error(f"the {what} are the text {of!r}; write {what} = gb.signals({of}=\"unit\")")
-    names = list(of)
+    names = list(of) if isinstance(of, Iterable) else [of]
     if not all(isinstance(name, str) for name in names):
         raise Error(f"the {what} are {names!r}; write {what} = gb.signals(name=\"unit\", ...)")
     if len(set(names)) < len(names):
@@ -187,8 +187,7 @@ class Vector:
             if key not in self._names:
                 refuse(f"there is no `{key}` among the {self._what}: {near(key, self._names)}")
             return self._entries[self._names.index(key)]
-        entries = self._entries[key]
-        return np.array(entries, dtype=object) if isinstance(key, slice) else entries
+        return _array(self._entries[key]).view(Symbols) if isinstance(key, slice) else self._entries[key]
 
     def __len__(self) -> int:
         return len(self._entries)
@@ -197,9 +196,13 @@ class Vector:
         return iter(self._entries)
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray[Any, np.dtype[Any]]:
-        array = np.empty(len(self._entries), dtype=object)
-        array[:] = self._entries
-        return array
+        return _array(self._entries)
+
+    def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Any, **kwargs: Any) -> Any:
+        return getattr(ufunc, method)(*_opened(inputs), **kwargs)
+
+    def __array_function__(self, function: Any, types: Any, args: Any, kwargs: Any) -> Any:
+        return function(*_opened(args), **_opened(kwargs))
 
     def keys(self) -> tuple[str, ...]:
         """Give the names, in order."""
@@ -207,6 +210,21 @@ class Vector:
 
     def __repr__(self) -> str:
         return f"<{self._what} {', '.join(self._names)}>"
+
+
+def _array(entries: Sequence[Any]) -> np.ndarray[Any, np.dtype[Any]]:
+    array = np.empty(len(entries), dtype=object)
+    array[:] = entries
+    return array
+
+
+def _opened(value: Any) -> Any:
+    """Give arguments of NumPy with an array of symbols in the place of each vector."""
+    if isinstance(value, Vector):
+        return value[:]
+    if isinstance(value, dict):
+        return {name: _opened(one) for name, one in value.items()}
+    return type(value)(_opened(one) for one in value) if isinstance(value, (list, tuple)) else value
 
 
 def in_order(entries: Mapping[str, Any], names: tuple[str, ...], where: str) -> list[Any]:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import linecache
 import sys
+import traceback
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NoReturn, TypeAlias, Union
@@ -18,7 +19,7 @@ import numpy as np
 from greybox import _core
 from greybox.errors import TraceError
 
-__all__ = ["Condition", "Number", "Symbol", "Trace", "each", "refuse", "where"]
+__all__ = ["Condition", "Number", "Symbol", "Symbols", "Trace", "called", "each", "refuse", "where"]
 
 #: What arithmetic takes.
 Number: TypeAlias = Union["Symbol", float, "np.floating[Any]", "np.integer[Any]"]
@@ -33,10 +34,24 @@ def refuse(what: str) -> NoReturn:
     frame = sys._getframe(1)
     while frame.f_back is not None and frame.f_code.co_filename.startswith(_OWN):
         frame = frame.f_back
-    name, line = frame.f_code.co_filename, frame.f_lineno
+    raise _error(frame.f_code.co_filename, frame.f_lineno, what)
+
+
+def _error(name: str, line: int, what: str) -> TraceError:
     text = linecache.getline(name, line).strip()
     text = text if len(text) <= 100 else text[:97] + "..."
-    raise TraceError(f"{name}, line {line}{f', in `{text}`' if text else ''}: {what}")
+    return TraceError(f"{name}, line {line}{f', in `{text}`' if text else ''}: {what}")
+
+
+def called(function: Callable[..., Any], *args: Any) -> Any:
+    """Call a function of the user; what NumPy says of an array of symbols is said with line and remedy."""
+    try:
+        return function(*args)
+    except TypeError as error:
+        if isinstance(error, TraceError) or not ("ufunc" in str(error) or "dtype('O')" in str(error)):
+            raise
+        lines = [one for one in traceback.extract_tb(error.__traceback__) if not one.filename.startswith(_OWN)]
+        raise _error(lines[-1].filename, lines[-1].lineno or 0, f"{_NO_ARRAY} ({error})") from error
 
 
 class Trace:
@@ -75,8 +90,14 @@ _KEPT = (
 _NO_NUMBER = "a comparison of symbols is used as a number; write gb.where(condition, 1.0, 0.0)"
 _NO_ANSWER = (
     "`if`, `and`, `or`, `not`, `while`, `a < b < c`, min and max ask for an answer, which only numbers have: the equations are read "
-    "once, before there are numbers. Write gb.where(condition, a, b), where conditions combine by &, | and ~, np.minimum or np.maximum"
+    "once, before there are numbers. Write gb.where(condition, a, b), where conditions combine by &, | and ~, np.minimum or np.maximum; of "
+    "arrays these and comparisons work on np.stack([a, b]), not on np.array([a, b])"
 )
+_NO_ARRAY = (
+    "NumPy has no such function of an array of symbols. Those of single entries work on np.stack([a, b]), not on np.array([a, b]); in the "
+    "place of np.linalg write A @ x, np.linalg.inv(A) @ x with an A of numbers, or the solution of a system in full"
+)
+_NO_COMPARISON = "`&`, `|`, `^` and `~` combine comparisons, each in parentheses: (x > 0) & (x < 1)"
 _NO_KEY = (
     "a symbol is looked up in a dict or a set, which find values: the equations are read once, before there are numbers. Write "
     "gb.where(x == 1, a, b), or np.interp for a table"
@@ -115,12 +136,32 @@ def each(function: Callable[..., Any], *operands: Any) -> Any:
     """Apply a function to numbers, or entry by entry to arrays, which are broadcast."""
     arrays = [plain(one) for one in operands]
     if all(one.ndim == 0 for one in arrays):
-        return function(*operands)
+        return function(*(one.item() if isinstance(one, np.ndarray) else one for one in operands))
     together = np.broadcast(*arrays)
     results = np.empty(together.shape, dtype=object)
     for place, entries in enumerate(together):
         results.flat[place] = function(*entries)
-    return results
+    return results.view(Symbols)
+
+
+class Symbols(np.ndarray[Any, np.dtype[Any]]):
+    """An array of symbols or of comparisons, whose comparisons and functions are those of its entries.
+
+    ``np.stack([a, b])`` makes one. Of ``np.array([a, b])``, an array of any objects, NumPy asks for answers in place of comparisons.
+    """
+
+    def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Any, **kwargs: Any) -> Any:
+        from greybox import numpy_functions
+
+        return numpy_functions.of_entries(ufunc, method, inputs, kwargs)
+
+    def __array_function__(self, function: Any, types: Any, args: Any, kwargs: Any) -> Any:
+        from greybox import numpy_functions
+
+        if numpy_functions.is_special(function):
+            return numpy_functions.of_arrays(function, args, kwargs)
+        found = super().__array_function__(function, types, args, kwargs)
+        return found.view(Symbols) if isinstance(found, np.ndarray) and found.dtype == object else found
 
 
 def operation(name: str, a: Any, b: Any) -> Any:
@@ -197,15 +238,24 @@ class Condition:
             return Condition(self.trace, lambda a, b: self.trace.symbol(a if value else b))
         refuse(f"a comparison is combined with {value!r}, which is none; compare it with a number, in parentheses: (x > 0) & (x < 1)")
 
-    def __and__(self, other: Any) -> Condition:
+    def __and__(self, other: Any) -> Any:
+        if isinstance(other, np.ndarray):
+            # NumPy combines it with each entry.
+            return NotImplemented
         other = self._other(other)
         return Condition(self.trace, lambda a, b: self.choose(other.choose(a, b), b))
 
-    def __or__(self, other: Any) -> Condition:
+    def __or__(self, other: Any) -> Any:
+        if isinstance(other, np.ndarray):
+            # NumPy combines it with each entry.
+            return NotImplemented
         other = self._other(other)
         return Condition(self.trace, lambda a, b: self.choose(a, other.choose(a, b)))
 
-    def __xor__(self, other: Any) -> Condition:
+    def __xor__(self, other: Any) -> Any:
+        if isinstance(other, np.ndarray):
+            # NumPy combines it with each entry.
+            return NotImplemented
         other = self._other(other)
         return Condition(self.trace, lambda a, b: self.choose(other.choose(b, a), other.choose(a, b)))
 
@@ -350,6 +400,11 @@ class Symbol:
         refuse(_NO_LENGTH)
 
     __len__ = __iter__ = __contains__ = _length
+
+    def _not_compared(self, *_: Any) -> NoReturn:
+        refuse(_NO_COMPARISON)
+
+    __and__ = __rand__ = __or__ = __ror__ = __xor__ = __rxor__ = __invert__ = _not_compared
 
     def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Any, **kwargs: Any) -> Any:
         from greybox import numpy_functions

@@ -82,6 +82,28 @@ def test_a_file_has_the_bits_of_its_numbers(kind: str, tmp_path: Path) -> None:
             gb.read(path, signals=["Body"])
 
 
+@pytest.mark.parametrize("kind", ["parquet", "arrow"])
+def test_an_index_of_pandas_without_a_name_is_the_time(kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    c = cooled()
+    frame = pd.DataFrame({"room": c["room"], "body": c["body"]}, index=pd.Timestamp("2025-03-20") + pd.to_timedelta(c["t"], unit="s"))
+    path = tmp_path / f"record.{kind}"
+
+    def written(frame: pd.DataFrame) -> Path:
+        frame.to_parquet(path) if kind == "parquet" else feather.write_feather(pa.Table.from_pandas(frame), path, compression="uncompressed")
+        return path
+
+    assert k_of(written(frame)) == k_of(frame)
+    assert k_of(pl.from_arrow(pa.Table.from_pandas(frame))) == k_of(frame)
+    assert k_of(written(frame.set_axis(c["t"]))) == k_of(c)
+    rows = gb.fleet(cooling(), pa.Table.from_pandas(frame.assign(which="a")), by="which", k=gb.free(1.0))
+    assert rows["k"][0].as_py() == pytest.approx(k_of(frame), rel=1e-9)
+    # What is left of the numbers of rows is no time, and no text is; a sample time does without them.
+    for index in (np.arange(200) + 5, [f"row {k}" for k in range(200)]):
+        assert k_of(written(frame.set_axis(index)), sample_time=0.1) == k_of(c)
+        with pytest.raises(gb.Error, match="no column `t` or `time`|neither a number"):
+            k_of(path)
+
+
 def test_several_files_and_what_is_said_of_each(tmp_path: Path) -> None:
     for name, k in {"cold": 0.3, "warm": 0.5}.items():
         pd.DataFrame(cooled(k=k)).rename(columns={"t": "when", "body": "T"}).to_csv(tmp_path / f"{name}.csv", index=False, sep=";", decimal=",")
@@ -248,6 +270,8 @@ WRONG: list[tuple[dict[str, Any], dict[str, Any], str]] = [
     ({"a": (np.array(["2025-03-20"], dtype="datetime64[ns]"), [1.0])}, {}, "has dates as times"),
     ({"a": ([0.0, 1.0], [1.0, 2.0]), "b": ([2.0, 3.0], [1.0, 2.0])}, {}, "`a` ends at 1 s, and `b` begins at 2 s"),
     ({"a": ([0.0, 1.0], [1.0, 2.0])}, {"step": 0.0}, "the step is 0.0"),
+    ({"a": ([0.0, 1.0], [1.0, 2.0])}, {"step": "0.1"}, "step is '0.1'; give a number"),
+    ({"a": [0.0, 1.0, 2.0]}, {}, "signal `a` is [0.0, 1.0, 2.0]; give its times and its values: (times, values)"),
     ({"a": ([0.0, 1.0], [1.0, 2.0])}, {"method": "cubic"}, "method of `a` is 'cubic'"),
     ({"a": ([0.0, 1.0], [1.0, 2.0])}, {"method": {"b": "last"}}, "method names `b`"),
 ]

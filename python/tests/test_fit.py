@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import os
 import pickle
+import re
 import subprocess
 import sys
 import warnings
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -142,6 +144,8 @@ def test_derived(fitted: gb.Fit) -> None:
     g = np.array([-tau.value / fitted.parameters.rs, 1 / fitted.parameters.rs])
     assert tau.standard_error == pytest.approx(float(np.sqrt(g @ fitted.covariance[:2, :2] @ g)), rel=1e-9)
     assert tau.lower < tau.value < tau.upper
+    with pytest.raises(gb.Error, match="the derived quantity is 'k'; give a function of p"):
+        fitted.derived("tau", "k")  # type: ignore[arg-type]
 
 
 def test_warnings_have_codes() -> None:
@@ -190,6 +194,30 @@ WRONG: list[tuple[dict[str, Any], str]] = [
     ({"k": gb.free(5.0, within=(0.0, 1.0))}, "k"),
     ({"k": gb.free(1.0), "weighting": lambda t, u, y: -1.0}, "weighting"),
     ({"k": gb.free(1.0), "weighting": lambda t, u, y: 1 if t > 3 else 0}, "gb.where"),
+    ({"k": gb.free(1.0), "weighting": 3.0}, "the weighting is 3.0; give a function of t, u, y"),
+    ({"k": gb.free(1.0), "weighting": lambda u, y: u.room}, "the weighting cannot be called with (t, u, y), which are handed over: too many"),
+    ({"k": gb.free(1.0), "starts": 2**70}, "starts is 1180591620717411303424; take a whole number of 1000000000 or less"),
+    ({"k": gb.free(1.0), "starts": 1.5}, "starts is 1.5; take a whole number of 1 or more"),
+    ({"k": gb.free(1.0), "sample_time": "0.1"}, "sample_time is '0.1'; give a number"),
+    ({"k": gb.free(1.0), "sample_time": -0.1}, "the sample time is -0.1; it must be positive and finite (s)"),
+    ({"k": gb.free(1.0), "time": 0}, "there is no column `0` for the time; the frame has: t, room, body"),
+    ({"k": gb.free(1.0), "time": [0.0, 0.1]}, "time is [0.0, 0.1]; give the name of a column"),
+    ({"k": gb.free(1.0), "columns": {"room": None}}, "the column of `room` is None; give the name of a column"),
+    ({"k": gb.free(1.0), "columns": "room"}, "columns is 'room'; give the column of each signal"),
+    ({"k": gb.free(1.0), "time_limit": "5"}, "time_limit is '5'; give a number"),
+    ({"k": gb.free(1.0), "time_limit": float("nan")}, "time limit"),
+    ({"k": gb.free(1.0), "noise": {"body": "a"}}, "`body` of noise is 'a'; give a number"),
+    ({"k": gb.free(1.0), "noise": {"body": float("nan")}}, "must be positive"),
+    ({"k": gb.free(1.0), "noise": np.full(1, 0.1)}, 'noise is array([0.1]); give a standard deviation for each by its name: {"body": 0.1}'),
+    ({"k": gb.free(1.0), "input_noise": {"room": None}}, "`room` of input_noise is None; give a number"),
+    ({"k": gb.free(1.0), "staged": "no"}, "staged is 'no'; take True or False"),
+    ({"k": gb.free(1.0), "multiple_shooting": 1}, "multiple_shooting is 1; take True or False"),
+    ({"k": gb.free(1.0), "checkpoint": 3}, "checkpoint is 3; give the path of a file"),
+    ({"k": gb.free(1.0), "predictor": 5}, "predictor is 5; give its name as text"),
+    ({"k": gb.free(1.0), "hold": 3}, 'hold is 3; give "zero", "first", or one of them for each input by its name'),
+    ({"k": gb.free(1.0), "hold": {"room": 1}}, "hold of `room` is 1; give its name as text"),
+    ({"k": gb.free(1.0), "initial": np.zeros(2)}, "initial state of array([0., 0.]): give the declaration of each by its name"),
+    ({"parameters": [gb.free(1.0)]}, "parameters is [free(1.0)]; give the declaration of each by its name"),
 ]
 
 
@@ -251,9 +279,68 @@ def test_simulate_is_the_record_that_it_makes() -> None:
         ({"parameters": {"k": 1.0, "l": 2.0}}, "parameters names `l`"),
         ({"parameters": {"k": 1.0}, "initial": {"b": 2.0}}, "initial names `b`"),
         ({"parameters": {"k": float("nan")}}, "not a number"),
+        ({"parameters": 0.3}, "parameters is 0.3; give a value for each by its name: {\"k\": 0.1}"),
+        ({"parameters": {"k": gb.fixed(0.3)}}, "`k` of parameters is fixed(0.3); give a number"),
+        ({"parameters": {"k": 1.0}, "initial": np.full(1, 80.0)}, "initial is array([80.]); give a value for each by its name"),
+        ({"parameters": {"k": 1.0}, "initial": {"body": None}}, "`body` of initial is None; give a number"),
+        ({"parameters": {"k": 1.0}, "noise": 0.1}, "noise is 0.1; give a standard deviation for each by its name: {\"body\": 0.1}"),
+        ({"parameters": {"k": 1.0}, "noise": {"body": float("nan")}}, "`body` of noise is nan; give a finite standard deviation of zero or more"),
+        ({"parameters": {"k": 1.0}, "noise": {"body": -0.1}}, "`body` of noise is -0.1; give a finite standard deviation of zero or more"),
+        ({"parameters": {"k": 1.0}, "seed": -1}, "seed is -1; take a whole number of 0 or more"),
+        ({"parameters": {"k": 1.0}, "seed": 2**64}, "seed is 18446744073709551616; take a whole number of 18446744073709551615 or less"),
+        ({"parameters": {"k": 1.0}, "seed": 0.5}, "seed is 0.5; take a whole number of 0 or more"),
+        ({"parameters": {"k": 1.0}, "integrator": 4}, "integrator is 4; give its name as text"),
+        ({"parameters": {"k": 1.0}, "time": 0}, "there is no column `0` for the time"),
     ]:
-        with pytest.raises(gb.Error, match=says):
+        with pytest.raises(gb.Error, match=re.escape(says)):
             gb.simulate(cooling(), u, **said)
+
+
+def test_what_the_model_says_of_noise_is_not_simulated() -> None:
+    u = {"t": np.arange(50) * 0.1, "room": np.full(50, 20.0)}
+    parts: dict[str, Any] = {"states": ["body"], "inputs": ["room"], "outputs": ["body"], "parameters": ["k"]}
+    noisy = gb.model(
+        lambda t, x, u, p: [p.k * (u.room - x.body)], diffusion=lambda t, x, u, p: [5.0], noise=lambda t, x, u, p: [2.0], **parts
+    )
+    said: dict[str, Any] = {"parameters": {"k": 0.3}, "initial": {"body": 80.0}, "integrator": "rk4:4"}
+    clean = gb.simulate(cooling(), u, **said)["body"]
+    assert (gb.simulate(noisy, u, **said, seed=7)["body"] == clean).all()
+    assert (gb.simulate(noisy, u, **said, noise={"body": 0.1})["body"] == gb.simulate(cooling(), u, **said, noise={"body": 0.1})["body"]).all()
+
+
+DECLARED: list[tuple[Callable[[], Any], str]] = [
+    (lambda: gb.free("1.0"), "start is '1.0'; give a number"),  # type: ignore[arg-type]
+    (lambda: gb.free(1.0, within=(0.1,)), "within is (0.1,); give two numbers: within=(0.1, 10.0)"),  # type: ignore[arg-type]
+    (lambda: gb.free(1.0, within=3.0), "within is 3.0; give two numbers"),  # type: ignore[arg-type]
+    (lambda: gb.free(1.0, prior=(1.0, None)), "the second number of prior is None; give a number"),  # type: ignore[arg-type]
+    (lambda: gb.free(1.0, log=1.0), "log is 1.0; take True or False"),  # type: ignore[arg-type]
+    (lambda: gb.fixed(None), "the value of gb.fixed is None; give a number"),  # type: ignore[arg-type]
+    (lambda: gb.pmsm.surface(pole_pairs=2**40), "pole_pairs is 1099511627776; take a whole number of 1000000000 or less"),
+    (lambda: gb.Record({}, name=3), "the name of the record is 3; give its name as text"),  # type: ignore[arg-type]
+]
+
+
+@pytest.mark.parametrize("declare, says", DECLARED)
+def test_what_is_wrong_with_a_declaration_is_named(declare: Callable[[], Any], says: str) -> None:
+    with pytest.raises(gb.Error) as raised:
+        declare()
+    assert says in str(raised.value), raised.value
+    # Bounds may be a list.
+    assert gb.free(1.0, within=[0.1, 10]) == gb.free(1.0, within=(0.1, 10.0))  # type: ignore[arg-type]
+
+
+def test_parameters_with_the_names_of_other_unknowns_are_refused() -> None:
+    parts: dict[str, Any] = {"states": ["body"], "inputs": ["room"], "outputs": ["body"]}
+    taken = gb.model(lambda t, x, u, p: [p[0] * (u.room - x.body)], **parts, parameters=["body(0)"])
+    with pytest.raises(gb.Error, match=r"parameter `body\(0\)`, which is the name of the state at the first sample; rename the parameter"):
+        gb.fit(taken, cooled(), parameters={"body(0)": gb.free(1.0)})
+    two = [gb.Record(cooled(), name="cold"), gb.Record(cooled(seed=2), name="warm")]
+    for name in ("k [cold]", "body(0) [warm]"):
+        model = gb.model(lambda t, x, u, p: [p.k * p[1] * (u.room - x.body)], **parts, parameters=["k", name])
+        said = {"k": gb.free(1.0, per_experiment=True), name: gb.fixed(1.0)}
+        with pytest.raises(gb.Error, match=f"parameter `{re.escape(name)}` has the name of an unknown of one record; rename"):
+            gb.fit(model, two, parameters=said)
+        assert gb.fit(model, two[0], parameters={**said, "k": gb.free(1.0)}).parameters.k == pytest.approx(0.3, rel=0.01)
 
 
 INTERRUPTED = """

@@ -119,6 +119,13 @@ WRONG: list[tuple[dict[str, Any], str]] = [
     ({"by": "which", "k": gb.free(1.0), "initial": {"bdy": gb.fixed(0.0)}}, "there is no initial state of `bdy`"),
     ({"by": "which", "k": gb.free(1.0), "noise": 0.1}, "give a standard deviation for each"),
     ({"by": "which", "k": gb.free(1.0), "sample_time": 0.1, "time": "t"}, "both give the time of the samples; leave one out"),
+    ({"by": [], "k": gb.free(1.0)}, "by is []; name at least one column that tells the records apart"),
+    ({"by": None, "k": gb.free(1.0)}, "by is None; give the name of a column"),
+    ({"by": ["which", 2.5], "k": gb.free(1.0)}, "by is 2.5; give the name of a column"),
+    ({"by": 3, "k": gb.free(1.0)}, "there is no column `3`"),
+    ({"by": "which", "k": gb.free(1.0), "starts": 2**70}, "starts is 1180591620717411303424"),
+    ({"by": "which", "k": gb.free(1.0), "sample_time": "0.1"}, "sample_time is '0.1'; give a number"),
+    ({"by": "which", "k": gb.free(1.0), "time": 0}, "there is no column `0`"),
 ]
 
 
@@ -127,6 +134,29 @@ def test_what_is_wrong_with_all_records_is_an_error(said: dict[str, Any], says: 
     with pytest.raises(gb.Error) as raised:
         gb.fleet(cooling(), bodies(2), **said)
     assert says in str(raised.value), raised.value
+
+
+def test_keys_of_other_kinds_are_other_records() -> None:
+    frame = bodies(3)
+    for keys in ([1, "1", 2], [1, None, "None"], [1, float("nan"), "nan"], [1, pd.NA, "<NA>"]):
+        of = frame.assign(which=pd.Series(np.repeat(np.array(keys, dtype=object), 200), dtype=object))
+        rows = gb.fleet(cooling(), of, by="which", k=gb.free(1.0))
+        assert rows["samples"].tolist() == [200] * 3 and str(rows["which"].tolist()) == str(keys)
+        # Also where the rows of a record do not follow each other.
+        mixed = gb.fleet(cooling(), of.sort_values("t", kind="stable"), by="which", k=gb.free(1.0))
+        assert np.array_equal(mixed["k"], rows["k"])
+    lists = {**{name: frame[name].to_numpy() for name in ("t", "room", "body")}, "which": [1] * 200 + ["1"] * 200 + [2] * 200}
+    assert gb.fleet(cooling(), lists, by="which", k=gb.free(1.0))["samples"] == [200] * 3
+    with pytest.raises(gb.Error, match="column `room` has 600 rows, and column `which` has 599; every sample needs both"):
+        gb.fleet(cooling(), {**lists, "which": lists["which"][:-1]}, by="which", k=gb.free(1.0))
+
+
+def test_columns_of_the_result_have_names_of_their_own() -> None:
+    model = gb.model(
+        lambda t, x, u, p: [p.k * p.k_error * (u.room - x.body)], states=["body"], inputs=["room"], outputs=["body"], parameters=["k", "k_error"]
+    )
+    with pytest.raises(gb.Error, match="the result would have two columns `k_error`; rename the parameter"):
+        gb.fleet(model, bodies(2), by="which", k=gb.free(1.0), k_error=gb.fixed(1.0))
 
 
 def test_progress(capsys: pytest.CaptureFixture[str]) -> None:

@@ -206,6 +206,20 @@ def test_letters_behind_an_underscore_are_a_unit_where_the_signal_has_one_of_ano
         k_of(frame, columns={**said, "room": "air_degC"})
 
 
+def test_names_of_columns_may_be_numbers() -> None:
+    c = cooled()
+    numbered = {0: c["t"], 1: c["room"], 2: c["body"], 3: np.repeat([5, 6], 100)}
+    said: dict[str, Any] = {"time": 0, "columns": {"room": 1, "body": 2}}
+    for frame in (numbered, pd.DataFrame(numbered)):
+        assert k_of(frame, **said) == k_of(c)
+        rows = gb.fleet(cooling(), frame, by=3, k=gb.free(1.0), **said)
+        assert list(rows["3"]) == [5, 6] and list(rows["samples"]) == [100, 100]
+    with pytest.raises(gb.Error, match="there is no column `room`; the frame has: 0, 1, 2, 3"):
+        k_of(pd.DataFrame(numbered), time=0)
+    with pytest.raises(gb.Error, match="the frame has two columns `1`, 1 and '1'; rename one"):
+        k_of({**c, 1: c["t"], "1": c["t"]})
+
+
 def test_missing_outputs_are_left_out() -> None:
     c = cooled()
     c["body"][50:60] = np.nan
@@ -239,6 +253,9 @@ WRONG: list[tuple[Callable[[dict[str, Any]], Any], str]] = [
     (lambda c: {**c, "body": c["body"].reshape(2, 100)}, "has the shape (2, 100)"),
     (lambda c: pd.DataFrame(c).iloc[:0], "2 or more are needed"),
     (lambda c: pd.DataFrame(c).iloc[:1], "2 or more are needed"),
+    (lambda c: {**c, "body": [[1.0], [1.0, 2.0]]}, "column `body` is no array"),
+    (lambda c: {**c, "t": [[1.0], [1.0, 2.0]]}, "column `t` is no array"),
+    (lambda c: {**c, "body": [10**400, *c["body"][1:]]}, "which is no number"),
     (lambda c: 3.0, "float is no frame"),
     (lambda c: [], "there is no record"),
 ]

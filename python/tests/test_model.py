@@ -135,6 +135,10 @@ def test_wrong_declarations_are_named() -> None:
         gb.model(lambda t, x: [x.a], states=["a"], outputs=["a"]).equations()
     with pytest.raises(gb.Error, match="make one of it"):
         gb.fit(Pmsm, {})  # type: ignore[arg-type]
+    with pytest.raises(gb.Error, match="the states are \\[3\\]; write states = gb.signals"):
+        gb.model(lambda t, x, u, p: [x.a], states=3, outputs=["a"])  # type: ignore[arg-type]
+    with pytest.raises(gb.Error, match="derivative of the model is 3; give a function of t, x, u, p"):
+        gb.model(3, states=["a"], outputs=["a"]).equations()  # type: ignore[arg-type]
     with pytest.raises(gb.Error, match="derive a class"):
         gb.fit(3, {})  # type: ignore[arg-type]
 

@@ -121,6 +121,40 @@ def test_profiles(fitted: gb.Fit) -> None:
     assert repr(profile).startswith("rs is within 0.62")
     with pytest.raises(gb.Error, match="there is no unknown `r`"):
         fitted.profile("r")
+    for ask in (lambda: fitted.profile("rs", "0.9"), lambda: fitted.interval("rs", "0.9"), lambda: fitted.bands("0.9")):  # type: ignore[arg-type]
+        with pytest.raises(gb.Error, match="probability is '0.9'; give a number"):
+            ask()
+    for ask in (lambda: fitted.profile("rs", float("nan")), lambda: fitted.interval("rs", 1.5), lambda: fitted.bands(0.0)):
+        with pytest.raises(gb.Error, match="probability"):
+            ask()
+    for ask in (lambda: fitted.profile(np.zeros(2)), lambda: fitted.interval(np.zeros(2))):  # type: ignore[arg-type]
+        with pytest.raises(gb.Error, match=r"name is array\(\[0., 0.\]\); give its name as text"):
+            ask()
+    with pytest.raises(gb.Error, match="title is 3; give its name as text"):
+        fitted.report(title=3)  # type: ignore[arg-type]
+
+
+def test_columns_of_one_name_are_not_lost() -> None:
+    def renamed(room: str, body: str) -> gb.Fit:
+        model = gb.model(lambda t, x, u, p: [p.k * (u[0] - x[0])], states=[body], inputs=[room], outputs=[body], parameters=["k"])
+        c = cooled()
+        return gb.fit(model, {"time": c["t"], room: c["room"], body: c["body"]}, k=gb.free(1.0))
+
+    for room, body, name in [("body_predicted", "body", "body_predicted"), ("body_residual", "body", "body_residual"), ("room", "t", "t")]:
+        with pytest.raises(gb.Error, match=f"the table would have two columns `{name}` of other values; rename the signal of the model"):
+            renamed(room, body).to_dataframe()
+    with pytest.raises(gb.Error, match="two columns `t`"):
+        renamed("room", "t").predict()
+    # What is an input and an output is one column.
+    c = cooled()
+    both = gb.model(
+        lambda t, x, u, p: [p.k * (u.room - x.body)], output=lambda t, x, u, p: [x.body, u.room], states=["body"], inputs=["room"],
+        outputs=["body", "room"], parameters=["k"],
+    )
+    made = gb.simulate(both, {"t": c["t"], "room": c["room"]}, parameters={"k": 0.3})
+    assert list(made) == ["t", "room", "body"] and (made["room"] == c["room"]).all()
+    with pytest.raises(gb.Error, match="two columns `room`"):
+        gb.simulate(both, {"t": c["t"], "room": c["room"]}, parameters={"k": 0.3}, noise={"room": 0.1})
 
 
 def test_single_residuals_of_colored_errors_are_warned_of() -> None:
@@ -150,7 +184,9 @@ def test_bootstrap(fitted: gb.Fit, tmp_path: Path) -> None:
     report = fitted.report(tmp_path / "r.html", bootstrap=drawn)
     assert "200 of 200 refits ended" in str(report) and "Bootstrap" in (tmp_path / "r.html").read_text()
     for said, says in [({"count": 0}, "count is 0"), ({"blocks": -1}, "blocks is -1"), ({"count": 10}, "twenty are the least"),
-                       ({"blocks": 3000}, "block")]:  # fmt: skip
+                       ({"blocks": 3000}, "block"), ({"count": 2**70}, "count is 1180591620717411303424; take a whole number of 1000000000 or"),
+                       ({"count": "200"}, "count is '200'"), ({"blocks": 1.5}, "blocks is 1.5"), ({"seed": -1}, "seed is -1"),
+                       ({"seed": 2**64}, "seed is 18446744073709551616")]:  # fmt: skip
         with pytest.raises(gb.Error, match=says):
             fitted.bootstrap(**said)
     with pytest.raises(gb.Error, match="there is no unknown `r`"):

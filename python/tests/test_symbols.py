@@ -99,6 +99,8 @@ def test_branches_take_the_side_of_the_value(read: Read, value: float) -> None:
             assert read(lambda x, u, p: where(condition(x), 3.0, 4.0), value) == expected
     assert read(lambda x, u, p: np.clip(x, 0.0, 1.0), value) == np.clip(value, 0.0, 1.0)
     assert read(lambda x, u, p: np.clip(x, None, 0.7), value) == np.clip(value, None, 0.7)
+    # Ends that cross at a value of a symbol: the upper one is the result, as NumPy has it.
+    assert read(lambda x, u, p: np.clip(x, u, p), value, 1.0, 0.5) == np.clip(value, 1.0, 0.5) == 0.5
     chosen = np.select([value < 0, value < 1], [1.0, 2.0], 3.0)
     assert read(lambda x, u, p: np.select([x < 0, x < 1], [1.0, 2.0], 3.0), value) == chosen
 
@@ -134,7 +136,71 @@ def test_vectors_and_matrices(read: Read) -> None:
     assert str(summed.equations()).splitlines()[:2] == ["d(a)/dt = a + b", "d(b)/dt = a"]
 
 
+@pytest.mark.parametrize("pair", [(-0.7, 0.4), (1.5, -2.0)])
+def test_functions_of_arrays_of_symbols_are_those_of_their_entries(read: Read, pair: tuple[float, float]) -> None:
+    numbers = np.array(pair)
+    expressions: list[Callable[[Any, Any], Any]] = [
+        *(lambda a, b, name=name: getattr(np, name)(a, 0.3) for name in OF_TWO if name not in ("power", "float_power")),
+        *(lambda a, b, name=name: getattr(np, name)(b, a) for name in OF_TWO if name not in ("power", "float_power")),
+        *(lambda a, b, name=name: getattr(np, name)(np.abs(a) / 3) for name in OF_ONE if name != "arccosh"),
+        lambda a, b: np.sign(a),
+        lambda a, b: np.clip(a, -0.2, 0.3),
+        lambda a, b: np.clip(a, -0.2, b),
+        lambda a, b: a.clip(-0.2, 0.3),
+        lambda a, b: np.where(a > 0.3, a, 3.0),
+        lambda a, b: np.where(a <= -a, a, 3.0),
+        lambda a, b: np.where((a > -1) & ~(a == 0.4) & (b > 0), 3.0, 4.0),
+        lambda a, b: np.where(np.logical_or(a > 0, b < 0), 3.0, 4.0),
+        lambda a, b: np.maximum(np.array([[1.0, 2.0], [3.0, 4.0]]) @ a, 0.0),
+        lambda a, b: np.maximum(np.concatenate([a, -a]), 0.0)[1:3],
+        lambda a, b: np.maximum(np.stack([a, -a]), 0.0)[1],
+        lambda a, b: np.sign(np.outer(a, a))[1],
+        lambda a, b: np.stack([a.max(), np.min(a)]),
+        lambda a, b: np.stack([np.where((a > -1).all(), 1.0, 2.0), np.where(np.any(a > 2), 1.0, 2.0)]),
+        lambda a, b: np.max(np.stack([a, -a]), axis=0),
+        lambda a, b: np.stack([a.sum(), a.mean()]),
+        lambda a, b: np.sin(np.stack([a[0], 1.0])),
+    ]
+    for expression in expressions:
+        expected = expression(numbers, 1.3)
+        for k in (0, 1):
+            # Powers by multiplication and remainders are rounded once more.
+            found = read(lambda x, u, p: expression(np.stack([x, u]), p)[k], *pair, 1.3)
+            assert found == pytest.approx(float(expected[k]), rel=4e-16, abs=1e-15), k
+
+    def added(x: Any, u: Any, p: Any) -> Any:
+        array = np.stack([x, u])
+        array += 1.0
+        array *= p
+        return array[1]
+
+    assert read(added, *pair, 2.0) == (pair[1] + 1.0) * 2.0
+
+
+def test_functions_of_a_vector_are_those_of_its_entries() -> None:
+    model = gb.model(
+        lambda t, x, u, p: np.maximum(x, u.low) - np.where(x[:] > 1.0, x, 0.0), states=["a", "b"], inputs=["low"], outputs=["a"], parameters=[]
+    )
+    assert str(model.equations()).splitlines()[0].startswith("d(a)/dt = max(a, low) - ")
+    assert "b" in str(model.equations()).splitlines()[1]
+
+
 REFUSED: list[tuple[Callable[[Any, Any], Any], str]] = [
+    (lambda x, u: np.maximum(np.array([x, u]), 0.0)[0], "np.stack([a, b])"),
+    (lambda x, u: (np.array([x, u]) > 0.0)[0], "np.stack([a, b])"),
+    (lambda x, u: np.sign(np.array([x, u]))[0], "np.stack([a, b])"),
+    (lambda x, u: np.clip(np.array([x, u]), 0.0, 1.0)[0], "np.stack([a, b])"),
+    (lambda x, u: np.copysign(np.array([x, u]), 1.0)[0], "np.stack([a, b])"),
+    (lambda x, u: np.rint(np.stack([x, u]))[0], "np.rint is not known"),
+    (lambda x, u: np.max(np.stack([x, u]), initial=0.0), "np.maximum.reduce with options"),
+    (lambda x, u: np.linalg.solve(np.eye(2), np.array([x, u]))[0], "np.linalg.inv(A) @ x"),
+    (lambda x, u: np.linalg.solve(np.eye(2), np.stack([x, u]))[0], "np.linalg.inv(A) @ x"),
+    (lambda x, u: np.linalg.inv(np.array([[x, 1], [1, u]]))[0, 0], "np.linalg.inv(A) @ x"),
+    (lambda x, u: np.linalg.det(np.array([[x, 1], [1, u]])), "the solution of a system in full"),
+    (lambda x, u: np.interp(np.array([x, u]), [0, 1], [0, 1])[0], "np.stack([a, b])"),
+    (lambda x, u: x & 1, "each in parentheses: (x > 0) & (x < 1)"),
+    (lambda x, u: np.clip(x, 1, 0), "np.clip has 1.0 as its lower end and 0.0 as its upper one, which is then the result everywhere; exchange them"),
+    (lambda x, u: np.clip(np.stack([x, u]), [0, 1], 0.5)[0], "np.clip has 1.0 as its lower end and 0.5"),
     (lambda x, u: 1 if x > 0 else 2, "gb.where"),
     (lambda x, u: 1 if x else 2, "gb.where"),
     (lambda x, u: x > 0 and x < 1, "gb.where"),
