@@ -1,6 +1,7 @@
 //! The command as a shell sees it: what it prints, what it leaves behind, and its exit codes.
 
 mod bench;
+mod derived;
 mod fleet;
 mod project;
 
