@@ -2,6 +2,7 @@
 
 mod bench;
 mod derived;
+mod files;
 mod fleet;
 mod project;
 
