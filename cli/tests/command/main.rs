@@ -5,6 +5,7 @@ mod derived;
 mod files;
 mod fleet;
 mod project;
+mod remarks;
 
 use bench::{Bench, MODEL, record, value};
 use std::path::Path;
