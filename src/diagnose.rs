@@ -20,7 +20,7 @@ pub(crate) use bands::{Widths, widths};
 pub use bootstrap::{Bootstrap, Resampling, bootstrap};
 pub use compare::{Candidate, Validation, cross_validate, f_test, likelihood_ratio, validate};
 pub use convergence::Convergence;
-pub use derived::{Derived, derived, derived_by};
+pub use derived::{derived, derived_by};
 pub use drift::{Drift, drift};
 pub use identifiability::{Collinear, Excitation, Identifiability, Segment, identifiability};
 pub(crate) use identifiability::{identifiability_beside_warnings, reworded};
@@ -28,6 +28,8 @@ pub(crate) use process_noise::cheap_process_noise;
 pub use process_noise::{ProcessNoise, process_noise};
 pub use profile::{End, Profile, ProfilePoint, profile};
 pub use side_by_side::Compared;
+
+pub use crate::estimate::Derived;
 
 use crate::error::Error;
 use crate::numeral::p_value;

@@ -19,7 +19,9 @@ pub use examination::{Examination, Extent};
 pub(crate) use format::{Format, Version};
 pub use method::{CovarianceMethod, Method, NoiseModel};
 pub use prediction::{Prediction, StatesOf};
-pub use quantities::{Direction, ExperimentEstimate, Knowledge, OutputEstimate, OutputFit, ParameterEstimate, Unknown};
+pub use quantities::{
+    Derived, Direction, ExperimentEstimate, Knowledge, OutputEstimate, OutputFit, ParameterEstimate, Unknown,
+};
 pub(crate) use starts::times_the_cost;
 pub use starts::{FailedStart, Minimum, Starts};
 pub use typed::{Estimate, Values};
@@ -59,6 +61,9 @@ pub struct Summary {
     pub noise_covariance: Option<SquareMatrix>,
     /// Directions of the unknowns that the data do not determine.
     pub directions: Vec<Direction>,
+    /// Quantities computed from the parameters, where any were asked for.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub derived: Vec<Derived>,
     /// How the search ended.
     pub outcome: Outcome,
     /// Results of searches from other starts; `None` if none were tried.

@@ -1,10 +1,11 @@
 //! `compare`: several models or estimates on the same records, on one page.
 
 use crate::arguments::Compare;
-use crate::fitting::{Loaded, declared, estimate, expanded, model, watched};
+use crate::fitting::{Loaded, declared, estimate, expanded, model, same_parameters, watched};
 use crate::terminal::Terminal;
 use crate::{Failure, Verdict, fit, output, records};
 use greybox::diagnose::Compared;
+use greybox::estimate::{Method, NoiseModel};
 use greybox::problem::Problem;
 use greybox::record::Record;
 use greybox::report::{Cell, Section, Table};
@@ -140,9 +141,7 @@ fn entrant(
         return Ok(Entrant { title: name.to_owned(), loaded, problem, estimate, own: true });
     };
     let (estimate, title) = (estimate(&path)?, format!("{name} ({})", path.display()));
-    if estimate.layout.parameters != loaded.model.equations().layout().parameters {
-        return Err(format!("{}: the estimate is of a model with other parameters", path.display()).into());
-    }
+    same_parameters(&path, &estimate, loaded.model.equations().layout())?;
     let own = estimate.own_parameters().into_iter().map(|j| estimate.parameters[j].name.as_str());
     shared(&title, &own.collect::<Vec<_>>(), validation)?;
     // One that is of other records or of an earlier version of the model has criteria of its own.
@@ -166,22 +165,54 @@ fn predicted(
     entrants.iter().enumerate().try_fold(compared, with)
 }
 
-/// Criteria of each model.
+/// Criteria of each model, and costs and AIC where those of all models are of one kind.
 fn summary(entrants: &[Entrant]) -> Section {
+    let own: Vec<&Summary> = entrants.iter().filter(|one| one.own).map(|one| &one.estimate).collect();
+    let (costs, aics) =
+        (are_alike(&own, weighed), are_alike(&own, |one| (one.method.prefilter.clone(), one.measurements)));
     let row = |one: &Entrant| {
         let unknowns = Cell::from(one.estimate.unknowns.len() as u64);
         [
             Cell::from(one.title.as_str()),
             Cell::from(one.estimate.severity().to_string()),
             unknowns,
-            Cell::optional(one.own.then_some(one.estimate.cost), 6),
-            Cell::optional(one.estimate.aic().filter(|_| one.own), 6),
+            Cell::optional((one.own && costs).then_some(one.estimate.cost), 6),
+            Cell::optional(one.estimate.aic().filter(|_| one.own && aics), 6),
         ]
     };
     let table = Table::new("Criteria", ["model", "verdict", "unknowns", "cost", "AIC"]).rows(entrants.iter().map(row));
     let section = Section::new("criteria", "Criteria of each model").table(table);
-    match entrants.iter().all(|one| one.own) {
-        true => section,
-        false => section.says("An estimate without cost and AIC is of other records, or of a model that has changed since; its verdict is that of its fit."),
-    }
+    let how = |one: &Entrant| {
+        let method = &one.estimate.method;
+        format!("{}: {}, noise {}, loss {}", one.title, method.predictor, method.noise, method.loss)
+    };
+    let how: Vec<String> = entrants.iter().filter(|one| one.own).map(how).collect();
+    let said = [
+        (!costs).then(|| format!("The costs are left out, because each is of errors that are weighed in another way ({}).", how.join("; "))),
+        (!aics).then(|| "The AIC is left out, because each is of another pre-filter or another number of predicted samples.".to_owned()),
+        entrants.iter().any(|one| !one.own).then(|| {
+            "An estimate without cost and AIC is of other records, or of a model that has changed since; its verdict is that of its fit."
+                .to_owned()
+        }),
+    ];
+    said.into_iter().flatten().fold(section, Section::says)
+}
+
+/// Whether this is the same of all estimates.
+fn are_alike<T: PartialEq>(all: &[&Summary], of: impl Fn(&Summary) -> T) -> bool {
+    all.windows(2).all(|pair| of(pair[0]) == of(pair[1]))
+}
+
+/// Which errors the cost of an estimate is of, and the noise levels by which they are divided: none where the noise is predicted, or where
+/// that of one output is but a factor of the cost.
+fn weighed(one: &Summary) -> (Vec<String>, Vec<f64>) {
+    let Method { predictor, loss, weighting, prefilter, noise, .. } = &one.method;
+    let has_prior = one.parameters.iter().any(|parameter| parameter.declared.prior.is_some());
+    let is_factor = one.outputs.len() == 1 && one.deviance.is_some() && !has_prior;
+    let levels = match noise {
+        NoiseModel::Predicted => vec![],
+        NoiseModel::PerOutput | NoiseModel::Covariance if is_factor => vec![],
+        _ => one.outputs.iter().map(|output| output.fit.sigma).collect(),
+    };
+    ([predictor, loss, weighting, prefilter, &noise.to_string()].map(String::clone).to_vec(), levels)
 }

@@ -1,11 +1,10 @@
 //! `fit`: parameters, with their intervals.
 
 use crate::arguments::Fit;
+use crate::derived::{self, Computed};
 use crate::fitting::{Loaded, load, read, watched};
 use crate::terminal::Terminal;
 use crate::{Failure, Verdict, output};
-use greybox::diagnose::{Derived, derived_by};
-use greybox::estimate::ExperimentEstimate;
 use greybox::problem::Problem;
 use greybox::report::{Cell, Origin, Section, Table};
 use greybox::{Report, Summary};
@@ -16,25 +15,14 @@ pub fn run(one: &Fit, terminal: &Terminal) -> Result<Verdict, Failure> {
     output::check(one.plot.as_deref(), if cfg!(feature = "png") { &["svg", "png"] } else { &["svg"] })?;
     output::apart([&one.json, &one.report, &one.plot, &one.fitting.of_fit.checkpoint], read(&one.fitting)?)?;
     let loaded = load(&one.fitting, terminal)?;
-    let derived: Vec<_> = one
-        .derived
-        .iter()
-        .map(|(name, text)| loaded.model.derived(text).map(|(graph, root)| (name, graph, root)))
-        .collect::<Result<_, _>>()?;
+    let expressions = derived::expressions(&one.derived, &loaded.model)?;
     let problem = watched(&loaded, &one.fitting.of_fit, terminal)?.problem()?;
-    let estimate = problem.run()?;
+    let mut estimate = problem.run()?;
     if terminal.stopped() {
         terminal.remark("ended by Ctrl-C: this is the best so far");
     }
-    let records = match estimate.own_parameters().is_empty() {
-        true => &estimate.experiments[..estimate.experiments.len().min(1)],
-        false => &estimate.experiments[..],
-    };
-    let of_record = |(k, record): (usize, &ExperimentEstimate)| {
-        let name = |name: &str| if records.len() > 1 { format!("{name} [{}]", record.name) } else { name.to_owned() };
-        derived.iter().map(|(of, graph, root)| derived_by(&estimate, k, &name(of), graph, *root)).collect::<Vec<_>>()
-    };
-    let derived: Vec<Derived> = records.iter().enumerate().flat_map(of_record).collect();
+    let derived = derived::computed(&expressions, &estimate);
+    estimate.derived = derived.iter().map(|one| one.derived.clone()).collect();
     let wanted = one.full || one.report.is_some() || one.plot.is_some();
     let report = if wanted { Some(report(&problem, &estimate, &loaded, &derived)?) } else { None };
     match &report {
@@ -43,7 +31,7 @@ pub fn run(one: &Fit, terminal: &Terminal) -> Result<Verdict, Failure> {
         }
         _ => {
             output::estimate(&estimate)?;
-            derived.iter().try_for_each(|one| output::line(shown(one)))?;
+            derived.iter().try_for_each(|one| output::line(&one.text))?;
         }
     }
     if let Some(path) = &one.json {
@@ -68,26 +56,12 @@ pub fn run(one: &Fit, terminal: &Terminal) -> Result<Verdict, Failure> {
     Ok(said.into())
 }
 
-/// A derived quantity with the digits that its standard error leaves.
-fn shown(one: &Derived) -> String {
-    let (Some(error), Some((lower, upper))) = (one.standard_error, one.interval) else {
-        if !one.value.is_finite() {
-            return format!("{}: its expression is no finite number at the estimate", one.name);
-        }
-        let value = Cell::number(one.value, 6);
-        return format!("{} = {}, not known: it depends on a parameter that is not", one.name, value.text());
-    };
-    let [value, lower, upper] = [one.value, lower, upper].map(|number| Cell::resolved(number, error));
-    let (value, error, lower, upper) = (value.text(), Cell::error(error), lower.text(), upper.text());
-    format!("{} = {value}, std. error {}, 95 % interval {lower} … {upper}", one.name, error.text())
-}
-
 /// The report of a fit, with where it came from.
 pub fn report(
     problem: &Problem<'_>,
     estimate: &Summary,
     loaded: &Loaded,
-    derived: &[Derived],
+    derived: &[Computed],
 ) -> Result<Report, Failure> {
     let mut origin = Origin::new().command(std::env::args()).at(std::time::SystemTime::now());
     for path in &loaded.files {
@@ -102,7 +76,7 @@ pub fn report(
     if derived.is_empty() {
         return Ok(report);
     }
-    let row = |one: &Derived| {
+    let row = |Computed { derived: one, .. }: &Computed| {
         let (lower, upper) = one.interval.map_or((None, None), |(lower, upper)| (Some(lower), Some(upper)));
         [
             Cell::from(one.name.as_str()),
@@ -113,5 +87,7 @@ pub fn report(
         ]
     };
     let table = Table::new("", ["quantity", "value", "std. error", "from", "to"]).rows(derived.iter().map(row));
-    Ok(report.with(Section::new("derived", "Quantities computed from the parameters").table(table)))
+    let section = Section::new("derived", "Quantities computed from the parameters").table(table);
+    let unknown = derived.iter().filter(|one| one.derived.interval.is_none());
+    Ok(report.with(unknown.fold(section, |section, one| section.says(&one.text))))
 }

@@ -5,7 +5,7 @@ use crate::terminal::Terminal;
 use crate::{Failure, records};
 use argmin::core::observers::ObserverMode;
 use greybox::equations::Equations;
-use greybox::layout::Layout;
+use greybox::layout::{Layout, Quantity};
 use greybox::record::Record;
 use greybox::text::{self, Model};
 use greybox::{Fit, Fleet, Initial, Parameter, Summary, fixed, free};
@@ -262,6 +262,42 @@ fn time_limit(options: &FitOptions) -> Result<Option<Duration>, Failure> {
 pub fn estimate(path: &Path) -> Result<Summary, Failure> {
     let text = std::fs::read_to_string(path).map_err(|error| format!("{}: {error}", path.display()))?;
     Ok(Summary::from_json(&text).map_err(|error| format!("{}: {error}", path.display()))?)
+}
+
+/// Refuses an estimate of a model that had other parameters.
+pub fn same_parameters(path: &Path, found: &Summary, layout: &Layout) -> Result<(), Failure> {
+    same("parameter", path, &found.layout.parameters, &layout.parameters)
+}
+
+/// Refuses an estimate of a model that had other states.
+pub fn same_states(path: &Path, found: &Summary, layout: &Layout) -> Result<(), Failure> {
+    same("state", path, &found.layout.states, &layout.states)
+}
+
+fn same(what: &str, path: &Path, found: &[Quantity], of_model: &[Quantity]) -> Result<(), Failure> {
+    if found == of_model {
+        return Ok(());
+    }
+    let unit = |one: &Quantity| if one.unit.is_empty() { "no unit".to_owned() } else { format!("\"{}\"", one.unit) };
+    let difference = |one: &Quantity| match of_model.iter().find(|now| now.name == one.name) {
+        None => Some(format!("it has `{}`, which is not in the model", one.name)),
+        Some(now) if now.unit != one.unit => {
+            Some(format!("`{}` is in {} in it and in {} in the model", one.name, unit(one), unit(now)))
+        }
+        Some(_) => None,
+    };
+    let added = of_model.iter().filter(|one| !found.iter().any(|before| before.name == one.name));
+    let added = added.map(|one| format!("it has no `{}`, which is in the model", one.name));
+    let mut differences: Vec<String> = found.iter().filter_map(difference).chain(added).collect();
+    if differences.is_empty() {
+        differences.push("they stand in another order".to_owned());
+    }
+    Err(format!(
+        "{}: the estimate is of a model with other {what}s: {}; fit this model, or take the model of the estimate",
+        path.display(),
+        differences.join(", ")
+    )
+    .into())
 }
 
 /// Numbers by name.

@@ -8,6 +8,7 @@ mod bootstrap;
 mod check;
 mod compare;
 mod convert;
+mod derived;
 mod describe;
 mod export;
 mod fit;

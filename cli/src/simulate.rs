@@ -1,11 +1,13 @@
 //! `simulate`: what a model does with given parameters and the inputs of a record.
 
 use crate::arguments::{ModelOptions, Simulate};
-use crate::fitting::{declared, estimate, model, numbers};
+use crate::fitting::{declared, estimate, model, numbers, same_parameters, same_states};
 use crate::terminal::Terminal;
 use crate::{Failure, Verdict, convert, output, records};
-use greybox::layout::Layout;
+use greybox::graph::Id;
+use greybox::layout::{Layout, Quantity};
 use greybox::record::Record;
+use greybox::text::Model;
 use greybox::{Fleet, fixed};
 use std::path::PathBuf;
 
@@ -32,8 +34,9 @@ pub fn run(one: &Simulate, terminal: &Terminal) -> Result<Verdict, Failure> {
     let said = |name: &str| one.of_model.set.iter().chain(&one.of_model.fix).any(|(known, _)| known == name);
     let mut found_state = None;
     if let (Some(found), Some(path)) = (stored, &one.estimate) {
-        if found.layout.parameters != layout.parameters {
-            return Err(format!("{}: the estimate is of a model with other parameters", path.display()).into());
+        same_parameters(path, &found, layout)?;
+        if as_found {
+            same_states(path, &found, layout)?;
         }
         let found = match found.of_record(&inputs) {
             Err(_) if found.own_parameters().iter().all(|j| said(&found.parameters[*j].name)) => found,
@@ -72,11 +75,35 @@ pub fn run(one: &Simulate, terminal: &Terminal) -> Result<Verdict, Failure> {
         };
         terminal.remark(format_args!("{origin} at {}; --initial gives another state", states.join(", ")));
     }
+    if let Some(text) = left_out(&model, &one.noise) {
+        terminal.remark(text);
+    }
     let simulated = fit.simulate(&initial, &inputs)?;
     let noise = numbers("--noise", &one.noise)?;
     let simulated = if noise.is_empty() { simulated } else { noisy(&simulated, layout, &noise, one.seed)? };
     convert::write(&simulated, one.out.as_deref())?;
     Ok(Verdict::Usable)
+}
+
+/// Says which noise of the model a simulation is without.
+fn left_out(model: &Model, said: &[(String, String)]) -> Option<String> {
+    let (layout, roots) = (model.equations().layout(), model.equations().roots());
+    let has_level = |root: Id| {
+        let (level, roots) = model.equations().graph().pruned(&[root]);
+        // What is not declared is a number, zero or none.
+        level.len() > 1 || level.evaluate::<f64>(&roots, |_| 1.0).iter().any(|value| *value > 0.0)
+    };
+    let names = |quantities: &[Quantity], roots: &[Id]| -> Vec<String> {
+        let with = quantities.iter().zip(roots).filter(|(_, root)| has_level(**root));
+        with.map(|(quantity, _)| quantity.name.clone()).collect()
+    };
+    let mut outputs = names(&layout.outputs, &roots.noise);
+    outputs.retain(|output| said.iter().all(|(name, _)| name != output));
+    let remedy = if outputs.is_empty() { "" } else { "; --noise OUTPUT=STD adds white noise to an output" };
+    let parts = [("noise", outputs), ("diffusion", names(&layout.states, &roots.diffusion))];
+    let parts = parts.into_iter().filter(|(_, names)| !names.is_empty());
+    let parts: Vec<String> = parts.map(|(what, names)| format!("`{what}` of {}", names.join(", "))).collect();
+    (!parts.is_empty()).then(|| format!("simulated without {} of the model{remedy}", parts.join(" and ")))
 }
 
 fn noisy(record: &Record, layout: &Layout, noise: &[(String, f64)], seed: u64) -> Result<Record, Failure> {

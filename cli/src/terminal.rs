@@ -1,5 +1,6 @@
 //! Progress and remarks on standard error, color, and Ctrl-C.
 
+use crate::remedies::in_shell;
 use argmin::core::observers::Observe;
 use argmin::core::{KV, State};
 use greybox::optimize::LeastSquaresState;
@@ -45,10 +46,10 @@ impl Terminal {
         std::io::stdout().is_terminal() && std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty())
     }
 
-    /// A remark, in one line.
+    /// A remark, in one line, in the words of the command line.
     pub fn remark(&self, text: impl std::fmt::Display) {
         if !self.quiet {
-            note(text);
+            note(in_shell(&text.to_string()));
         }
     }
 

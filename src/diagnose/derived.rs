@@ -1,34 +1,15 @@
 //! Delta method: how well a function of the parameters is known, by its exact slopes.
 
 use crate::dual::Dual;
-use crate::estimate::{Estimate, Summary, Unknown, student};
+use crate::estimate::{Derived, Estimate, Summary, Unknown, student};
 use crate::graph::{Graph, Id, Leaf};
 use crate::model::Model;
 use crate::parameter::Transform;
 use crate::problem::Role;
 use crate::signals::{Of, Signals};
-use serde::{Deserialize, Serialize};
 
 /// Slopes taken at once.
 const LANES: usize = 8;
-
-/// A quantity computed from the parameters.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Derived {
-    /// Its name.
-    pub name: String,
-    /// Its value.
-    #[serde(with = "crate::real")]
-    pub value: f64,
-    /// Its standard error, to first order (Rao, *Linear Statistical Inference and Its Applications*, 1973, section 6a.2);
-    /// `None` if it depends on a parameter that has none because it is held or not determined, or is not a number.
-    #[serde(with = "crate::real")]
-    pub standard_error: Option<f64>,
-    /// The 95 % interval by Student's t.
-    #[serde(with = "crate::real")]
-    pub interval: Option<(f64, f64)>,
-}
 
 /// A function of the parameters with its interval: `derived(&estimate, "kt", |p| p.ke * 1.5)`. Parameters that each
 /// experiment has for itself are those of the first; fixed ones count as exact.

@@ -159,6 +159,24 @@ pub struct OutputEstimate {
     pub fit: OutputFit,
 }
 
+/// A quantity computed from the parameters.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Derived {
+    /// Its name.
+    pub name: String,
+    /// Its value.
+    #[serde(with = "crate::real")]
+    pub value: f64,
+    /// Its standard error, to first order (Rao, *Linear Statistical Inference and Its Applications*, 1973, section 6a.2);
+    /// `None` if it depends on a parameter that has none because it is held or not determined, or is not a number.
+    #[serde(with = "crate::real")]
+    pub standard_error: Option<f64>,
+    /// The 95 % interval by Student's t.
+    #[serde(with = "crate::real")]
+    pub interval: Option<(f64, f64)>,
+}
+
 /// A set of parameters that the data cannot tell apart.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Direction {

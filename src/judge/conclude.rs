@@ -91,6 +91,7 @@ fn summary_of(evidence: &Evidence<'_>, seconds: f64) -> Result<Summary, Error> {
             Whitening::Diagonal(_) => None,
         },
         directions,
+        derived: vec![],
         outcome: end.outcome,
         starts: end.starts.clone(),
         warnings,

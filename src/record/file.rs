@@ -1,5 +1,6 @@
 //! [`DataFile`]: from a file to a record, and from a record to a CSV file.
 
+mod beside;
 mod bytes;
 #[cfg_attr(not(all(feature = "arrow", feature = "mat", feature = "npz")), allow(dead_code))]
 mod columns;
@@ -102,7 +103,7 @@ use std::path::{Path, PathBuf};
 /// Dates in them, and texts that are dates, become seconds from the first. Objects of MATLAB (`datetime`, `table`) are refused: save
 /// `seconds(t - t(1))`, and `table2struct(T, "ToScalar", true)`.
 ///
-/// **Time** is the column `t`, or the only one called `time`, `timestamp`, `datetime`, `Zeit` or the like. It does not decrease. Numbers are
+/// **Time** is the column `t`, or the only one called `time`, `timestamp`, `datetime`, `Zeit` or the like that holds no signal. It does not decrease. Numbers are
 /// seconds, unless a unit stands behind or below the name, or they can only be milli-, micro- or nanoseconds since 1970. Dates
 /// (`2025-03-20T14:05:00.5Z`, `2025-03-20 14:05`, `20.03.2025 14:05:00`, `03/20/2025 2:05:00 PM`, `20-Mar-2025 14:05:00`) and times of day
 /// (`14:05:00`) become seconds from the first. Whether day or month stands first is seen from numbers above 12, from time that must not
@@ -221,7 +222,7 @@ impl DataFile {
         self.with(input, |column| column.fill = Some(hold))
     }
 
-    /// Time from a constant sample time (s) instead of a column; it starts at zero.
+    /// Time from a constant sample time (s) instead of a column; it starts at zero. A column of another time is refused.
     pub fn sample_time(self, step: f64) -> Self {
         DataFile { sample_time: Some(step), ..self }
     }

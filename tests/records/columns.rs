@@ -96,8 +96,8 @@ fn what_is_said_of_a_file_holds_for_columns() {
     let record =
         file.clone().factor("ud", 2.0).offset("ud", 1.0).reversed("w").read_record(&Layout::of::<Pmsm>()).unwrap();
     assert_eq!([0, 1].map(|input: usize| record.inputs()[input].values[3]), [9.0, -40.0]);
-    let record = file.clone().sample_time(0.25).read_record(&Layout::of::<Pmsm>()).unwrap();
-    assert_eq!(record.times(), &Time::Uniform { start: 0.0, step: 0.25 });
+    let record = file.clone().sample_time(0.5).read_record(&Layout::of::<Pmsm>()).unwrap();
+    assert_eq!(record.times(), &Time::Uniform { start: 0.0, step: 0.5 });
     let record = file.column("t", "w").read_record(&Layout::of::<Pmsm>()).unwrap();
     assert_eq!(record.times(), &Time::Uniform { start: 10.0, step: 10.0 });
 }
@@ -142,7 +142,7 @@ fn mistakes_name_the_column_and_the_remedy() {
         &["column `w` holds an array of 4 x 2 cells"],
     );
     says(
-        kinds.column("w", "t").column("ud", "id").read_record(&Layout::of::<Pmsm>()),
+        kinds.column("w", "t").column("t", "t").column("ud", "id").read_record(&Layout::of::<Pmsm>()),
         &["column `id` holds a cell array"],
     );
     says(

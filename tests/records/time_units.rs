@@ -55,7 +55,8 @@ fn what_is_no_unit_of_time_is_refused() {
 #[test]
 fn whole_nanoseconds_since_1970_are_not_rounded() {
     for (name, header) in [("nanoseconds", "time [ns]"), ("counts", "time")] {
-        let rows: String = (0..100).map(|k| format!("{},1,2,3,4\n", 1_742_479_500_000_000_123 + 126_000 * k)).collect();
+        let rows: String =
+            (0..100).map(|k| format!("{},1,2,3,4\n", 1_742_479_500_000_000_123i64 + 126_000 * k)).collect();
         let path = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(format!("time_unit_{name}.csv"));
         std::fs::write(&path, format!("{header},ud,w,id,iq\n{rows}")).unwrap();
         let record = Experiment::from_file(&Pmsm, path).unwrap();

@@ -1,6 +1,7 @@
 //! What is stored as JSON keeps to the schemas in `schema/`, and what differs is refused by them. The documents are those of the
 //! committed example, a report with everything, as the library of today writes them.
 
+use greybox::diagnose::Derived;
 use greybox::optimize::Outcome;
 use greybox::pmsm::{Surface, Winding};
 use greybox::report::{Cell, Section, Table};
@@ -55,6 +56,8 @@ fn spoiled(estimate: &Summary, value: f64) -> Summary {
     spoiled.unknowns[1].error_index = Some(value);
     spoiled.parameters[0].value = value;
     spoiled.parameters[0].declared = free(value).within(value, value).prior(value, value);
+    let derived = |interval| Derived { name: "tau".to_owned(), value, standard_error: Some(value), interval };
+    spoiled.derived = vec![derived(Some((value, value))), derived(None)];
     spoiled.outputs[0].fit.rmse = value;
     spoiled.outputs[0].fit.fit_percent = Some(value);
     spoiled

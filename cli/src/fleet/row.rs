@@ -71,6 +71,14 @@ impl Row {
         self.verdict == "failed"
     }
 
+    /// Why there is no estimate, after the name of the record, with which reasons may begin.
+    pub fn failure(&self) -> String {
+        let (record, group) = (&self.name.record, self.name.group.as_ref());
+        let group = group.map_or(String::new(), |group| format!(", {group}"));
+        let reason = self.reason.strip_prefix(record.as_str()).filter(|rest| rest.starts_with([':', ',']));
+        reason.map_or_else(|| format!("{record}{group}: {}", self.reason), |rest| format!("{record}{group}{rest}"))
+    }
+
     pub fn verdict(&self) -> Verdict {
         match self.verdict.as_str() {
             "usable with care" => Verdict::WithCare,

@@ -119,8 +119,7 @@ impl Table {
     /// Adds a row, and says why a record has no estimate.
     pub fn add(&mut self, row: Row, terminal: &Terminal) -> Result<(), Failure> {
         if row.is_failed() {
-            let group = row.name.group.as_ref().map_or(String::new(), |group| format!(", {group}"));
-            terminal.remark(format_args!("{}{group}: {}", row.name.record, row.reason));
+            terminal.remark(row.failure());
         }
         if let Some(journal) = &mut self.journal {
             journal.add(&row)?;

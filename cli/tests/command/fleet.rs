@@ -13,7 +13,7 @@ fn a_fleet_is_a_table_that_goes_on_where_it_was() {
     }
     std::fs::write(bench.path("b.csv"), "t,ud,uq,w,id,iq\n0,1,2\n").unwrap();
     let (_, error) = bench.ends(3, &["fleet", "pmsm.toml", "[abc].csv", "--out", "motors.csv"]);
-    assert!(error.contains("b.csv"), "{error}");
+    assert!(error.lines().any(|line| line.starts_with("b.csv, line 2: ")), "{error}");
     let table = std::fs::read_to_string(bench.path("motors.csv")).unwrap();
     let rows: Vec<&str> = table.lines().collect();
     assert_eq!(rows.len(), 4, "{table}");
@@ -85,7 +85,8 @@ fn a_column_tells_the_records_of_a_file_apart() {
     std::fs::write(bench.path("motors.csv"), text.replacen("m1,", "m1,x", 1)).unwrap();
     let words = ["fleet", "pmsm.toml", "motors.csv", "--by", "motor", "--out", "t.csv"];
     let (_, error) = bench.ends(3, &words);
-    assert!(error.contains("motors.csv, m1: ") && error.contains("line 3"), "{error}");
+    // The file is named once.
+    assert!(error.contains("motors.csv, m1, line 3, column `t`: ") && !error.contains("motors.csv: "), "{error}");
     assert!(error.lines().last().unwrap().starts_with("3 records: ") && error.contains("1 failed"), "{error}");
     let table = std::fs::read_to_string(bench.path("t.csv")).unwrap();
     let rows: Vec<&str> = table.lines().collect();
@@ -105,6 +106,24 @@ fn a_column_tells_the_records_of_a_file_apart() {
     assert_eq!(out.lines().nth(1).unwrap().split_once(',').unwrap().1, rows[3].split_once(",m2,").unwrap().1);
     let (_, error) = bench.ends(1, &["fleet", "pmsm.toml", "motors.csv", "--by", "rs"]);
     assert!(error.contains("two columns `rs`"), "{error}");
+}
+
+/// As of other kinds of files: a column of measurements is none of names.
+#[test]
+fn numbers_that_are_not_whole_tell_no_records_apart() {
+    let bench = Bench::new();
+    let (_, error) = bench.ends(3, &["fleet", "pmsm.toml", "record.csv", "--by", "ud"]);
+    assert!(
+        error.contains("column `ud` holds numbers that are not whole, where text or whole numbers are wanted"),
+        "{error}"
+    );
+    assert!(error.contains("1 records: ") && error.contains("1 failed"), "{error}");
+    // Names may be numbers with a part behind the point where others are none.
+    motors(&bench, "motors.csv", 2);
+    let text = std::fs::read_to_string(bench.path("motors.csv")).unwrap().replace("m0,", "1.5,");
+    std::fs::write(bench.path("motors.csv"), text).unwrap();
+    let (out, _) = bench.ends(0, &["fleet", "pmsm.toml", "motors.csv", "--by", "motor"]);
+    assert!(out.lines().count() == 3 && out.contains("motors.csv,1.5,"), "{out}");
 }
 
 /// Killed at any point, and started again until it ends: each motor once, and the numbers of a run that was not killed.

@@ -1,8 +1,11 @@
 //! The command as a shell sees it: what it prints, what it leaves behind, and its exit codes.
 
 mod bench;
+mod derived;
+mod files;
 mod fleet;
 mod project;
+mod remarks;
 
 use bench::{Bench, MODEL, record, value};
 use std::path::Path;

@@ -40,7 +40,7 @@ fn what_excludes_an_entry_of_the_project_takes_its_place() {
     let words = ["fit", "--noise", "id=0.05", "--initial", "id=0", "--multiple-shooting", "--time", "t"];
     assert_eq!(answers(&bench, &words).lines().next(), answers(&project(""), &words).lines().next());
     let bench = project("noise = { id = 0.05 }\ninitial = { id = 0 }\ntime = 'Time'\ntime-unit = 'ms'\nzone = 'UTC'");
-    answers(&bench, &["fit", "--noise-covariance", "--initial", "first", "--sample-time", "5e-4"]);
+    answers(&bench, &["fit", "--noise-covariance", "--initial", "first", "--sample-time", "2.5e-4"]);
 }
 
 #[test]

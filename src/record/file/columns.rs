@@ -80,7 +80,9 @@ impl Cells {
     fn numbers(&self) -> Option<Cow<'_, [f64]>> {
         match self {
             Cells::Numbers(numbers) => Some(numbers.into()),
-            Cells::Whole(counts) => Some(counts.iter().map(|count| count.map_or(f64::NAN, |count| count as f64)).collect()),
+            Cells::Whole(counts) => {
+                Some(counts.iter().map(|count| count.map_or(f64::NAN, |count| count as f64)).collect())
+            }
             _ => None,
         }
     }
@@ -203,11 +205,25 @@ fn guarded<T>(file: &DataFile, format: FileFormat, read: impl FnOnce() -> Result
     catch_unwind(AssertUnwindSafe(read)).unwrap_or_else(|_| Err(damaged()))
 }
 
-/// Reads the signals of a plan, then its time, then the column to group by.
+/// Reads the signals of a plan, then its time, then the column to group by. A column that cannot be read tells no time beside a sample time that was said, and is
+/// left out of the plan.
 ///
 /// # Errors
 /// As [`Columns::read`]; columns that differ in length.
 pub(super) fn read(
+    of: &DataFile,
+    file: &mut (dyn Columns + '_),
+    plan: &mut Plan,
+    keys: Option<usize>,
+) -> Result<Vec<Cells>, Error> {
+    let cells = read_planned(of, file, plan, keys);
+    match cells {
+        Err(_) if of.sample_time.is_some() && plan.time.take().is_some() => read_planned(of, file, plan, keys),
+        cells => cells,
+    }
+}
+
+fn read_planned(
     of: &DataFile,
     file: &mut (dyn Columns + '_),
     plan: &Plan,

@@ -2,12 +2,16 @@
 
 use super::bytes::decoded;
 use super::columns::{self, Cells};
+use super::numbers::Numbers;
 use super::read::Rows;
 use super::{Column, DataFile};
 use crate::error::Error;
 use crate::layout::Layout;
 use crate::record::Record;
 use rustc_hash::FxHashMap;
+
+/// So many names are looked at before all rows are read.
+const FIRST: usize = 1000;
 
 /// Records by the cell that their rows have in common, in the order of their first rows.
 type Groups<T> = Vec<(String, Result<T, Error>)>;
@@ -41,9 +45,9 @@ impl DataFile {
     pub fn read_groups(&self, layout: &Layout, by: &str) -> Result<Groups<Record>, Error> {
         self.check(layout)?;
         let Some(mut file) = columns::open(self)? else { return self.text_groups(layout, by) };
-        let plan = self.plan(layout, file.names(), |at| file.unit(at))?;
+        let mut plan = self.plan(layout, file.names(), |at| file.unit(at))?;
         let at = self.named(file.names(), by)?;
-        let cells = columns::read(self, file.as_mut(), &plan, Some(at))?;
+        let cells = columns::read(self, file.as_mut(), &mut plan, Some(at))?;
         let keys = match cells.last() {
             Some(Cells::Texts(keys)) => keys,
             other => {
@@ -68,15 +72,29 @@ impl DataFile {
         let mut places = Places::default();
         let mut groups: Groups<Rows> = vec![];
         while table.next()? {
-            let key = decoded(table.cell(at));
+            let (key, before) = (decoded(table.cell(at)), groups.len());
             let place = places.of(self, &key, by, &mut groups, || Rows::new(&plan));
+            if before < FIRST && groups.len() == FIRST {
+                self.check_names(by, &groups, &numbers)?;
+            }
             if let Ok(rows) = &mut groups[place].1
                 && let Err(error) = rows.push(self, &plan, &table, &mut numbers, true)
             {
                 groups[place].1 = Err(error);
             }
         }
+        self.check_names(by, &groups, &numbers)?;
         Ok(named(groups, |rows| rows.finish(self, &plan, &table, &numbers)))
+    }
+
+    /// Refuses names that are numbers alone, and not whole: a column of measurements tells no records apart.
+    fn check_names(&self, by: &str, groups: &Groups<Rows>, numbers: &Numbers) -> Result<(), Error> {
+        let mut numbers = numbers.clone();
+        let all: Option<Vec<f64>> = groups.iter().map(|(name, _)| numbers.read(name.as_bytes())).collect();
+        match all.is_some_and(|all| all.iter().any(|number| number.is_finite() && number.fract() != 0.0)) {
+            true => Err(self.wrong_kind(by, "numbers that are not whole", "text or whole numbers")),
+            false => Ok(()),
+        }
     }
 
     /// The place of a column that is no signal.

@@ -147,7 +147,7 @@ impl Form {
 /// Whether cells between the names and a row are units. Only the columns of time and of signals tell: a text in another is a remark, and a row whose time
 /// is a number is a sample.
 fn are_units(file: &DataFile, names_of_file: &[String], wanted: &[&str], units: &[String], after: &[String]) -> bool {
-    let time = file.time_column(names_of_file).ok();
+    let time = file.time_column(names_of_file, &[]).ok();
     let is_number = |cell: &String| !is_missing(cell.as_bytes()) && is_value(cell);
     if time.and_then(|at| units.get(at)).is_some_and(is_number) {
         return false;

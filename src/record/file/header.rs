@@ -55,7 +55,7 @@ impl Header {
     /// # Errors
     /// Several columns of that name.
     pub fn time(&self, said: Option<&str>) -> Result<Option<usize>, Error> {
-        match self.timed(said).time_column(&self.names) {
+        match self.timed(said).time_column(&self.names, &[]) {
             Ok(at) => Ok((said.is_some() || !self.names[at].is_empty()).then_some(at)),
             Err(Error::MissingColumn { .. }) => Ok(None),
             Err(error) => Err(error),
@@ -73,7 +73,9 @@ impl Header {
             return Err(self.file.cannot(format!("there is no column in place {time} of {columns} (from zero)")));
         };
         let file = self.timed(Some(name));
-        Ok(file.ticks(&self.names, None, time, Count::Number(first))?.map_or((1.0, 0.0), |ticks| (ticks.unit, ticks.origin)))
+        Ok(file
+            .ticks(&self.names, None, time, Count::Number(first))?
+            .map_or((1.0, 0.0), |ticks| (ticks.unit, ticks.origin)))
     }
 
     fn timed(&self, said: Option<&str>) -> DataFile {

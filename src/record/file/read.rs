@@ -38,7 +38,7 @@ pub(super) struct Plan<'a> {
     layout: &'a Layout,
     pub(super) signals: Vec<&'a Quantity>,
     pub(super) sources: Vec<Source>,
-    /// The column of time; none where its steps are even.
+    /// The column of time; none where its steps are even, unless it stands beside a sample time that was said.
     pub(super) time: Option<usize>,
     /// The even step (s).
     pub(super) step: f64,
@@ -61,8 +61,8 @@ impl DataFile {
     pub fn read_record(&self, layout: &Layout) -> Result<Record, Error> {
         self.check(layout)?;
         if let Some(mut file) = columns::open(self)? {
-            let plan = self.plan(layout, file.names(), |at| file.unit(at))?;
-            let cells = columns::read(self, file.as_mut(), &plan, None)?;
+            let mut plan = self.plan(layout, file.names(), |at| file.unit(at))?;
+            let cells = columns::read(self, file.as_mut(), &mut plan, None)?;
             return self.of_columns(&plan, file.as_ref(), &cells, None);
         }
         let (mut table, mut numbers, plan) = self.text(layout, &[])?;
@@ -94,15 +94,17 @@ impl DataFile {
         below: impl Fn(usize) -> Option<&'b str>,
     ) -> Result<Plan<'a>, Error> {
         let signals: Vec<&Quantity> = layout.inputs.iter().chain(&layout.outputs).collect();
+        let taken: Vec<usize> = signals.iter().filter_map(|signal| self.place(names, &signal.name).ok()).collect();
         // A static model needs no time: its rows are numbered where no column but those of its signals may be that of the time.
-        let others = || {
-            let taken: Vec<usize> = signals.iter().filter_map(|signal| self.place(names, &signal.name).ok()).collect();
-            names.iter().enumerate().filter(move |(at, _)| !taken.contains(at)).map(|(_, name)| name)
-        };
+        let mut others = names.iter().enumerate().filter(|(at, _)| !taken.contains(at));
         let said = self.columns.iter().any(|column| column.signal == "t");
-        let untimed = layout.kind == Kind::Static && !said && !others().any(|name| tells_time(name));
+        let untimed = layout.kind == Kind::Static && !said && !others.any(|(_, name)| tells_time(name));
         let step = self.sample_time.or(untimed.then_some(1.0));
-        let time = if step.is_none() { Some(self.time_column(names)?) } else { None };
+        let time = match (self.sample_time, step) {
+            (Some(_), _) => self.beside(names, &taken),
+            (None, Some(_)) => None,
+            (None, None) => Some(self.time_column(names, &taken)?),
+        };
         let mut units = Vec::new();
         let sources = signals.iter().map(|signal| self.source(names, &below, signal, &mut units));
         let sources = sources.collect::<Result<Vec<_>, _>>()?;

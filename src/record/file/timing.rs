@@ -32,6 +32,8 @@ const ROUNDED: f64 = 9_007_199_254_740_992.0;
 pub(super) enum Timing {
     /// A constant step (s).
     Even(f64),
+    /// A constant step (s) that was said, and what a column says of the time.
+    Said { step: f64, beside: Box<Timing> },
     /// A column of numbers.
     Numbers { ticks: Ticks, clock: Clock, stamps: Option<Vec<f64>> },
     /// A column of dates, and a second one of the times of day.
@@ -41,7 +43,7 @@ pub(super) enum Timing {
 /// How numbers become seconds.
 #[derive(Clone)]
 pub(super) struct Ticks {
-    column: usize,
+    pub(super) column: usize,
     pub(super) unit: f64,
     /// The unit in which they are shown.
     pub(super) shown: TimeUnit,
@@ -105,6 +107,11 @@ pub(super) fn tells_time(name: &str) -> bool {
         || suffix(name, false).is_some()
 }
 
+/// Whether a column of this name has dates, which may be without times of day.
+pub(super) fn tells_date(name: &str) -> bool {
+    DATES.contains(&plain(split_unit(name).0).as_str())
+}
+
 /// Whether a number is a date and a time of day, digit by digit: 20250320140500, without seconds or with milliseconds. As milliseconds or microseconds
 /// since 1970 these would be years to come, or of twelve digits the 1970s.
 fn is_compact(number: f64) -> bool {
@@ -121,13 +128,19 @@ fn is_compact(number: f64) -> bool {
 }
 
 impl DataFile {
-    /// The column of time: the one that was said, `t`, or the only one of such a name.
-    pub(super) fn time_column(&self, names: &[String]) -> Result<usize, Error> {
-        let are = |is: &dyn Fn(&str) -> bool| -> Vec<usize> { (0..names.len()).filter(|at| is(&names[*at])).collect() };
+    /// The column of time: the one that was said, `t`, or the only one of such a name; none of these places, which hold signals.
+    ///
+    /// # Errors
+    /// No such column, or several.
+    pub(super) fn time_column(&self, names: &[String], taken: &[usize]) -> Result<usize, Error> {
+        let is_free = |at: &usize| !taken.contains(at);
+        let are = |is: &dyn Fn(&str) -> bool| -> Vec<usize> {
+            (0..names.len()).filter(|at| is_free(at) && is(&names[*at])).collect()
+        };
         let called = |list: &[&str]| are(&|name| list.contains(&plain(split_unit(name).0).as_str()));
         let over = || are(&|name| over_time(name).is_some_and(|(name, _)| NAMES.contains(&plain(name).as_str())));
         let found = self.place(names, "t");
-        if found.is_ok() || self.said("t").name.is_some() {
+        if found.as_ref().is_ok_and(is_free) || self.said("t").name.is_some() {
             return found;
         }
         // Units stand behind an underscore, too.
@@ -138,7 +151,17 @@ impl DataFile {
             }
         }
         // Unnamed, as pandas writes an index.
-        if names.first().is_some_and(String::is_empty) { Ok(0) } else { found }
+        if names.first().is_some_and(String::is_empty) {
+            return Ok(0);
+        }
+        match taken.iter().find(|at| tells_time(&names[**at])) {
+            Some(at) => Err(self.cannot(format!(
+                "column `{}` holds a signal of the model, so that it is not the time, and no other column is: say which one holds the time by \
+                 DataFile::column, or give DataFile::sample_time",
+                names[*at]
+            ))),
+            None => found,
+        }
     }
 
     /// How the numbers of a column of time become seconds, as its first number, its name and the unit below it say; none where they are
@@ -234,9 +257,18 @@ impl DataFile {
         column: usize,
         kept: bool,
     ) -> Result<Timing, Error> {
+        let found = self.timing_in(table, numbers, column, kept);
+        let Some(step) = self.sample_time else { return found };
+        Ok(found.map_or(Timing::Even(step), |beside| Timing::Said { step, beside: Box::new(beside) }))
+    }
+
+    /// The time in a column.
+    fn timing_in(&self, table: &Table, numbers: &mut Numbers, column: usize, kept: bool) -> Result<Timing, Error> {
         let cell = table.cell(column);
         if let Some(number) = numbers.read(cell) {
-            let Some(ticks) = self.ticks(table.names(), table.form().unit(column), column, Count::read(cell, number))? else {
+            let Some(ticks) =
+                self.ticks(table.names(), table.form().unit(column), column, Count::read(cell, number))?
+            else {
                 return Ok(Timing::Even(1.0));
             };
             // A pipe cannot be read again.
@@ -298,6 +330,15 @@ impl Timing {
     ) -> Result<f64, Error> {
         match self {
             Timing::Even(step) => Ok(sample as f64 * *step),
+            Timing::Said { step, beside } => {
+                let step = *step;
+                if let Err(error) = beside.tick(file, table, numbers, sample) {
+                    beside.check_order(file, table, step, error)?;
+                    // What cannot be read tells no time.
+                    *self = Timing::Even(step);
+                }
+                Ok(sample as f64 * step)
+            }
             Timing::Numbers { ticks, clock, stamps } => {
                 let cell = table.cell(ticks.column);
                 let number = numbers.read(cell).map(|number| ticks.time(Count::read(cell, number)));
@@ -352,6 +393,12 @@ impl Timing {
         let name = |column: usize| table.names()[column].clone();
         match self {
             Timing::Even(step) => Ok((Time::Uniform { start: 0.0, step }, TimeSource::Even { step })),
+            Timing::Said { step, beside } => {
+                if let Ok((time, source)) = beside.finish(file, table, rows) {
+                    file.agree(step, &time, &source)?;
+                }
+                Timing::Even(step).finish(file, table, rows)
+            }
             Timing::Numbers { ticks: Ticks { column, unit, origin, .. }, clock, stamps } => {
                 let time = clock.uniform().unwrap_or_else(|| {
                     Time::Stamps(stamps.unwrap_or_else(|| clock.last().into_iter().cycle().take(rows).collect()))

@@ -11,6 +11,14 @@ use crate::record::Time;
 use jiff::tz::TimeZone;
 use jiff::{SignedDuration, Timestamp};
 
+/// Times (s), the unit in which they are shown, and where they are from.
+type Times = ((Time, TimeUnit), TimeSource);
+
+/// Times of an even step (s).
+fn even(step: f64) -> Times {
+    ((Time::Uniform { start: 0.0, step }, TimeUnit::default()), TimeSource::Even { step })
+}
+
 impl DataFile {
     /// The times of the rows, or of some of them (s), the unit in which they are shown, and where they are from.
     pub(super) fn column_times(
@@ -19,10 +27,19 @@ impl DataFile {
         file: &dyn Columns,
         cells: &[Cells],
         rows: Option<&[usize]>,
-    ) -> Result<((Time, TimeUnit), TimeSource), Error> {
+    ) -> Result<Times, Error> {
+        let (Some(at), Some(cells)) = (plan.time, cells.get(plan.sources.len())) else { return Ok(even(plan.step)) };
+        let found = self.times_in(at, file, cells, rows);
+        let Some(step) = self.sample_time else { return found };
+        if let Ok(((time, _), source)) = &found {
+            self.agree(step, time, source)?;
+        }
+        Ok(even(step))
+    }
+
+    /// The times in a column.
+    fn times_in(&self, at: usize, file: &dyn Columns, cells: &Cells, rows: Option<&[usize]>) -> Result<Times, Error> {
         let seconds = TimeUnit::default;
-        let even = |step| Ok(((Time::Uniform { start: 0.0, step }, seconds()), TimeSource::Even { step }));
-        let (Some(at), Some(cells)) = (plan.time, cells.get(plan.sources.len())) else { return even(plan.step) };
         let row = |sample: usize| rows.map_or(sample, |rows| rows[sample]);
         let samples = rows.map_or(cells.len(), <[usize]>::len);
         let column = file.names()[at].clone();
@@ -34,7 +51,7 @@ impl DataFile {
                     _ => Count::Number(f64::NAN),
                 };
                 let first = if samples == 0 { Count::Number(0.0) } else { number(0) };
-                let Some(ticks) = self.ticks(file.names(), file.unit(at), at, first)? else { return even(1.0) };
+                let Some(ticks) = self.ticks(file.names(), file.unit(at), at, first)? else { return Ok(even(1.0)) };
                 let stamps = (0..samples).map(|sample| ticks.time(number(sample))).collect();
                 let source = TimeSource::Numbers { column, unit: ticks.unit, origin: ticks.origin };
                 Ok(((Time::from_stamps(stamps), ticks.shown), source))
@@ -75,7 +92,7 @@ impl DataFile {
         samples: usize,
         stamp: impl Fn(usize) -> Option<Stamp>,
         text: impl Fn(usize) -> Option<String>,
-    ) -> Result<((Time, TimeUnit), TimeSource), Error> {
+    ) -> Result<Times, Error> {
         let mut dates = self.dates_of(&column)?;
         for sample in 0..samples {
             let Some(stamp) = stamp(sample) else {
