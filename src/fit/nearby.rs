@@ -3,10 +3,10 @@
 use super::search::{at_end, settled};
 use super::starts::search_from_many;
 use crate::covariance::SearchEnd;
-use crate::estimate::{About, Minimum, Starts, Summary, Warning, WarningCode, times_the_cost};
-use crate::judge::conclude;
+use crate::estimate::{About, Minimum, Starts, Summary, Unknown, Warning, WarningCode, times_the_cost};
+use crate::judge::{INDISTINGUISHABLE, conclude};
 use crate::numeral::number;
-use crate::problem::{Control, Lead, Problem, SearchPlan, Settings};
+use crate::problem::{Control, Lead, Problem, Role, SearchPlan, Settings};
 use crate::random::Random;
 use crate::severity::Severity;
 use std::time::Instant;
@@ -23,17 +23,31 @@ const LONGEST_IN_LANES: usize = 100_000;
 const LONGEST: usize = 5_000;
 const ROUGH: &str = "the errors are colored, and the cost does not rise as its slopes say beside";
 
+/// Distances from a dead time, in samples. Where inputs are held, the cost has a kink where the dead time is a whole number of samples, and may have a
+/// minimum between any two of these: of 40 lags of ten samples, with white inputs and a dead time that began 1.3 samples off, 19 ended in a wrong one.
+const SAMPLES_BESIDE: [f64; 4] = [-1.5, -0.5, 0.5, 1.5];
+/// The part of a dead time by which a parameter is moved to see whether it moves one.
+const MOVED: f64 = 1e-6;
+/// The most dead times that are searched beside.
+const MOST_DEAD_TIMES: usize = 2;
+
+/// The standard errors from which on another minimum is apart from an estimate: nearer ones are on both sides of one whole number of samples.
+const OUTSIDE: f64 = 3.0;
+
+/// Why searches begin near an estimate.
+#[derive(Clone, Copy, PartialEq)]
+enum Reason {
+    Rough,
+    DeadTime,
+}
+
 impl Problem<'_> {
-    /// The estimate at the lowest minimum that searches from places near an estimate find, with a warning; the same estimate with a note where none is lower.
-    /// Both with the evaluations of all searches. `None` where no such search is made: errors are not colored, the cost rises as its slopes say, or
-    /// the records are long.
+    /// The estimate at the lowest minimum that searches from places near an estimate find, with a warning; the same estimate where none is lower.
+    /// Both with the evaluations of all searches. `None` where no such search is made: no dead time is sought, and errors are not colored or the cost rises as
+    /// its slopes say, or the records are long.
     pub(super) fn searched_nearby(&self, found: &Summary, control: &Control) -> Option<Summary> {
         let longest = if self.runs_in_lanes() { LONGEST_IN_LANES } else { LONGEST };
-        let is_warned =
-            |code| found.warnings.iter().any(|warning| warning.code == code && warning.severity > Severity::Usable);
-        if !(is_warned(WarningCode::ColoredErrors) && is_warned(WarningCode::CurvedInterval))
-            || self.settings.searches == SearchPlan::All(1)
-            || !found.outcome.converged()
+        if self.settings.searches == SearchPlan::All(1)
             || self.sweep.predicts_variance()
             || self.samples() > longest
             || control.stops()
@@ -42,9 +56,14 @@ impl Problem<'_> {
         }
         let begin = Instant::now();
         let method = self.by_number(found.method.refinement);
-        let places = method.places_near(found)?;
-        let ends = with_places(found, places);
         let asked = matches!(self.settings.searches, SearchPlan::All(_));
+        let (places, reason) = match is_rough(found) {
+            true => (method.places_near(found)?, Reason::Rough),
+            false if asked => return None,
+            false => (method.beside_dead_times(found)?, Reason::DeadTime),
+        };
+        let tried = places.len();
+        let ends = with_places(found, places);
         let searches = if asked { SearchPlan::All } else { SearchPlan::Best }(ends.minima.len());
         let settings = Settings { checkpoint: None, lead: Lead::Declared, searches, ..method.settings.clone() };
         let problem = Problem { settings, finer: None, ..method.clone() };
@@ -53,35 +72,63 @@ impl Problem<'_> {
         let end = search_from_many(&plain, &optimizer, ends.minima.len(), Some(&ends)).ok()?;
         let starts = end.starts.clone()?;
         let evaluations = found.evaluations + starts.evaluations - ends.evaluations;
-        // The first minimum that was passed on is that of the estimate.
-        let before = starts.minima.get(starts.declared?)?;
-        let lower = starts.declared? > 0 && end.outcome.converged();
-        let (mut best, text) = if lower {
+        // The first minimum that was passed on is that of the estimate, if it is one.
+        let before = starts.declared.and_then(|declared| starts.minima.get(declared));
+        if reason == Reason::Rough && before.is_none() {
+            return None;
+        }
+        let lower = starts.declared != Some(0) && end.outcome.converged();
+        let mut best = found.clone();
+        if lower {
             let end = settled(&plain, SearchEnd { starts: asked.then(|| starts.clone()), ..end });
-            let best = conclude(&at_end(&plain, &end), &end, 0.0).ok()?;
-            let place = before.unknowns.iter().map(|(name, value)| format!("`{name}` = {}", number(*value, 5)));
-            let place = place.collect::<Vec<_>>().join(", ");
-            let text = format!(
-                "{ROUGH} the minimum that was found first, with {} at {place}: of {PLACES} searches from places near it {} to this one",
-                times_the_cost(before.cost_ratio),
-                if starts.agreed == 1 { "one led".to_owned() } else { format!("{} led", starts.agreed) }
-            );
-            (best, text)
-        } else {
-            (
-                found.clone(),
-                format!("{ROUGH} this minimum: none of {PLACES} searches from places near it ended in a lower one"),
-            )
-        };
-        let severity = if lower { Severity::UsableWithCare } else { Severity::Usable };
-        best.warnings.push(Warning::new(WarningCode::DeclaredStartElsewhere, severity, text).about(About::Minimum));
+            best = conclude(&at_end(&plain, &end), &end, 0.0).ok()?;
+        }
+        best.warnings.extend(match reason {
+            Reason::Rough => Some(rough(&starts, before.filter(|_| lower))),
+            Reason::DeadTime => beside(&starts, before.filter(|_| lower), &best, tried),
+        });
         let seconds = found.seconds + begin.elapsed().as_secs_f64();
-        Some(Summary {
-            iterations: found.iterations + if lower { best.iterations } else { 0 },
-            evaluations,
-            seconds,
-            ..best
-        })
+        let iterations = found.iterations + if lower { best.iterations } else { 0 };
+        Some(Summary { iterations, evaluations, seconds, ..best })
+    }
+
+    /// Coordinates of places at which the dead times of inputs that a parameter moves are some samples from those of an estimate; `None` if there is none.
+    fn beside_dead_times(&self, found: &Summary) -> Option<Vec<Vec<f64>>> {
+        let record = self.records.first()?;
+        let step = (record.time(record.len() - 1) - record.time(0)) / (record.len() - 1) as f64;
+        let at: Vec<f64> =
+            found.unknowns.iter().map(|unknown| unknown.transform.to_coordinate(unknown.value)).collect();
+        let late = |at: &[f64], e: usize| self.sweep.late(&self.unknowns.of_experiment(e, at).p);
+        let mut places = vec![];
+        let (mut moved, bounds) = (0, self.unknowns.bounds());
+        for (i, unknown) in found.unknowns.iter().enumerate() {
+            let row = &self.unknowns.row[i];
+            if !matches!(row.role, Role::Parameter(_)) {
+                continue;
+            }
+            let e = row.experiment.unwrap_or(0);
+            let place = |value: f64| {
+                let mut place = at.clone();
+                place[i] = unknown.transform.to_coordinate(value).max(bounds[i].0).min(bounds[i].1);
+                place
+            };
+            let far = MOVED * unknown.value.abs().max(step);
+            let (here, there) = (late(&at, e), late(&place(unknown.value + far), e));
+            let slopes = here
+                .iter()
+                .zip(&there)
+                .filter_map(|(here, there)| Some((*here)?.max((*there)?) - (*here)?.min((*there)?)));
+            let slope = slopes.fold(0.0, f64::max) / far;
+            if slope == 0.0 {
+                continue;
+            }
+            moved += 1;
+            let is_late = |place: &Vec<f64>| late(place, e).iter().flatten().all(|time| *time >= 0.0);
+            places.extend(
+                SAMPLES_BESIDE.map(|samples| place(unknown.value + samples * step / slope)).into_iter().filter(is_late),
+            );
+        }
+        (1..=MOST_DEAD_TIMES).contains(&moved).then_some(places).filter(|places| !places.is_empty())
     }
 
     /// Coordinates of places near an estimate; `None` where an unknown has no standard error.
@@ -97,6 +144,70 @@ impl Problem<'_> {
         let columns: Vec<Vec<f64>> = columns.collect::<Option<_>>()?;
         Some((0..PLACES).map(|place| columns.iter().map(|column| column[place]).collect()).collect())
     }
+}
+
+/// Whether errors are colored, and the cost does not rise from an estimate as its slopes say.
+fn is_rough(found: &Summary) -> bool {
+    let is_warned =
+        |code| found.warnings.iter().any(|warning| warning.code == code && warning.severity > Severity::Usable);
+    is_warned(WarningCode::ColoredErrors) && is_warned(WarningCode::CurvedInterval) && found.outcome.converged()
+}
+
+/// A minimum in words.
+fn at(minimum: &Minimum) -> String {
+    let place = minimum.unknowns.iter().map(|(name, value)| format!("`{name}` = {}", number(*value, 5)));
+    format!("{} at {}", times_the_cost(minimum.cost_ratio), place.collect::<Vec<_>>().join(", "))
+}
+
+/// How many of the searches led to the best minimum.
+fn led(starts: &Starts) -> String {
+    if starts.agreed == 1 { "one led".to_owned() } else { format!("{} led", starts.agreed) }
+}
+
+/// What is said of searches where the cost is rough, with the minimum before if theirs is lower.
+fn rough(starts: &Starts, before: Option<&Minimum>) -> Warning {
+    let (severity, text) = match before {
+        Some(before) => (
+            Severity::UsableWithCare,
+            format!(
+                "{ROUGH} the minimum that was found first, with {}: of {PLACES} searches from places near it {} to this one",
+                at(before),
+                led(starts)
+            ),
+        ),
+        None => (
+            Severity::Usable,
+            format!("{ROUGH} this minimum: none of {PLACES} searches from places near it ended in a lower one"),
+        ),
+    };
+    Warning::new(WarningCode::DeclaredStartElsewhere, severity, text).about(About::Minimum)
+}
+
+/// What is said of searches from other dead times: another minimum that the data do not tell from the best one, with an unknown outside its interval, or the
+/// one before.
+fn beside(starts: &Starts, before: Option<&Minimum>, best: &Summary, tried: usize) -> Option<Warning> {
+    let is_outside = |(unknown, (_, value)): (&Unknown, &(String, f64))| {
+        let error = unknown.knowledge.standard_error();
+        error.is_some_and(|error| (value - unknown.value).abs() > OUTSIDE * error)
+    };
+    let is_apart = |minimum: &Minimum| best.unknowns.iter().zip(&minimum.unknowns).any(is_outside);
+    let is_as_good = |minimum: &Minimum| best.measurements as f64 * minimum.cost_ratio.ln() < INDISTINGUISHABLE;
+    let rival = |minimum: &&Minimum| is_as_good(minimum) && is_apart(minimum);
+    if let Some(rival) = starts.minima.iter().skip(1).find(rival) {
+        let text = format!(
+            "another minimum explains the data as well, with {}, between other whole numbers of samples of a dead time: an interval holds for one of them \
+             alone; profile the dead time, or use an input that changes less often",
+            at(rival)
+        );
+        return Some(Warning::new(WarningCode::RivalMinimum, Severity::UsableWithCare, text).about(About::Minimum));
+    }
+    let text = format!(
+        "the search ended first in another minimum, with {}, beside a whole number of samples of a dead time: of {tried} searches from dead times near it {} to \
+         this one",
+        at(before?),
+        led(starts)
+    );
+    Some(Warning::new(WarningCode::DeclaredStartElsewhere, Severity::Usable, text).about(About::Minimum))
 }
 
 /// Minima from which searches go on: that of an estimate, others that were found with it, and these places.

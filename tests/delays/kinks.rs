@@ -62,3 +62,30 @@ fn minima_of_a_fast_plant() {
         assert!(errors.into_iter().all(|errors| errors < 4.0), "{seed}: {errors:?} {found}");
     }
 }
+
+/// An input that changes at every sample: the cost has a minimum between any two whole numbers of samples, of which a single search may end in
+/// a wrong one. A start 1.3 samples off leads to the estimate of a start at the truth.
+#[test]
+fn minima_between_whole_numbers_of_samples() {
+    let mut state = 7u64;
+    let mut random = || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+    };
+    let mut elsewhere = 0;
+    for seed in 0..20 {
+        let inputs: Vec<Valve> = (0..400).map(|_| Valve { u: random() }).collect();
+        let truth = Process { y0: 0.0, k: 2.0, tau: 10.0, theta: 3.3 };
+        let time = Time::Uniform { start: 0.0, step: 1.0 };
+        let run =
+            Simulator::new(&Heated).integrator(Rk4 { substeps: 4 }).run(&truth, &Excess { z: 0.0 }, time, &inputs);
+        let record = run.unwrap().with_noise(Sensor { y: 0.15 }, seed).experiment(&Heated).unwrap();
+        let record = record.initial(Excess { z: fixed(0.0) });
+        let [found, right] = [2.0, 3.3].map(|theta| fit(&record, free(theta).within(0.0, 20.0)));
+        let plain = Process { y0: fixed(0.0), k: free(1.0), tau: free(6.0), theta: free(2.0).within(0.0, 20.0) };
+        let single = Fit::new(&Heated, &record).parameters(plain).starts(1).run().unwrap();
+        elsewhere += u32::from((single.parameters.theta - right.parameters.theta).abs() > 0.1);
+        assert!((found.parameters.theta - right.parameters.theta).abs() < 1e-4, "{seed}: {found} {right}");
+    }
+    assert!(elsewhere >= 3, "{elsewhere}");
+}

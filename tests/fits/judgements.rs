@@ -419,3 +419,24 @@ fn a_prior_that_the_data_contradict_is_said() {
     assert!(text.contains("3.6 standard deviations of"), "{text}");
     assert_eq!(said(6.0, 0.01), None);
 }
+
+/// A common factor of all weights leaves the distance of two independent numbers as it is: of ten and eleven standard errors, with a prior of three,
+/// 3.16 and 3.48 of the root of ten.
+#[test]
+fn weights_do_not_contradict_a_prior() {
+    let record = record(400, (2.0, 2.0), 0.5, moving);
+    let alone = Fit::new(&Twice, &record).parameters(Factor { a: free(1.0) }).run().unwrap();
+    let (a, error) = (alone.parameters.a, alone.unknowns[0].knowledge.standard_error().unwrap());
+    for weight in [1.0, 100.0] {
+        let said = |far: f64| {
+            let prior = free(1.0).prior(a + far * error, 3.0 * error);
+            let fit = Fit::new(&Twice, &record).parameters(Factor { a: prior });
+            let fit = fit.weighting(move |_: &Sample<Twice>| weight).run().unwrap();
+            let warning = fit.warnings.iter().find(|warning| warning.code == WarningCode::PriorContradicts);
+            warning.map(|warning| warning.text.clone())
+        };
+        assert_eq!(said(10.0), None, "{weight}");
+        let text = said(11.0).unwrap();
+        assert!(text.contains("3.5 standard deviations of"), "{weight} {text}");
+    }
+}

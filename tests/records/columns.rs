@@ -224,6 +224,7 @@ fn records_of_one_file_are_told_apart_by_a_column() {
         ("motors.parquet", "serial", ["4611686018427387906", "4611686018427387905", "4611686018427387907"]),
         ("motors.csv", "motor", ["b", "a", "c"]),
         ("motors.npz", "motor", ["1", "0", "2"]),
+        ("motors.npz", "serial", ["4611686018427387906", "4611686018427387905", "4611686018427387907"]),
     ] {
         let mut groups = by(name, column);
         assert_eq!(groups.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>(), names);
@@ -235,7 +236,6 @@ fn records_of_one_file_are_told_apart_by_a_column() {
             is_the_record(&group, Ok(record), &said);
         }
     }
-    says(DataFile::new(file("motors.npz")).read_groups(&layout, "serial"), &["`serial` holds numbers beyond 2^53"]);
     says(
         DataFile::new(file("motors.parquet")).read_groups(&layout, "ud"),
         &["`ud` holds cells of type Float64", "whole numbers"],

@@ -154,7 +154,8 @@ fn against_priors(evidence: &Evidence<'_>, unknowns: &[Unknown]) -> Vec<Warning>
     let rows = evidence.point.objective.problem.unknowns.row.iter().zip(unknowns).enumerate();
     let one = |(i, (row, unknown)): (usize, (&Free, &Unknown))| {
         let prior = row.parameter.prior?;
-        let distance = distance(unknown, prior).filter(|distance| *distance > UNLIKELY)?;
+        let by_weights = evidence.unit()?.standard_error(i) * unknown.transform.slope(unknown.value);
+        let distance = distance(unknown, prior, by_weights).filter(|distance| *distance > UNLIKELY)?;
         let (Unknown { name, value, .. }, Prior { mean, std }) = (unknown, prior);
         let unit = unit_after(&unknown.unit);
         let text = format!(
@@ -171,11 +172,12 @@ fn against_priors(evidence: &Evidence<'_>, unknowns: &[Unknown]) -> Vec<Warning>
     rows.filter_map(one).collect()
 }
 
-/// How far an estimate is from the mean of its prior, in standard deviations of that distance: the prior's variance less that of the
-/// estimate (Hausman, Econometrica 46 (1978) 1251: an estimate that is efficient is uncorrelated with its difference to another one).
-fn distance(unknown: &Unknown, prior: Prior) -> Option<f64> {
+/// How far an estimate is from the mean of its prior, in standard deviations of that distance. `by_weights` is its standard error if the weights of the
+/// data are the inverse of their variance. The estimate takes a part `w = 1 - by_weights^2 / std^2` of its value from the data, whatever their
+/// noise, so that the variance of the distance is `error^2 + (2 w - 1) std^2`; with right weights `std^2 - error^2` (Hausman, Econometrica 46 (1978) 1251).
+fn distance(unknown: &Unknown, prior: Prior, by_weights: f64) -> Option<f64> {
     let error = unknown.knowledge.standard_error()?;
-    let variance = prior.std * prior.std - error * error;
+    let variance = error * error + prior.std * prior.std - 2.0 * by_weights * by_weights;
     // An estimate that is hardly better than its prior says nothing of it.
     (variance > LITTLE * prior.std * prior.std).then(|| (unknown.value - prior.mean).abs() / variance.sqrt())
 }
