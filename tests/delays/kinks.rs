@@ -53,14 +53,20 @@ fn minima_at_a_whole_number_of_samples() {
 /// creep towards the kink.
 #[test]
 fn minima_of_a_fast_plant() {
+    let mut rivals = 0;
     for seed in 0..30 {
         let found = fit(&record(seed, 0.8, 15.0), free(10.0).within(0.0, 60.0));
-        assert!(found.severity() == Severity::Usable, "{seed}: {found}");
+        // In few the data do not tell the estimate from a minimum on the other side of 15 s.
+        let rival = found.warnings.iter().any(|warning| warning.code == WarningCode::RivalMinimum);
+        let severity = if rival { Severity::UsableWithCare } else { Severity::Usable };
+        assert!(found.severity() == severity, "{seed}: {found}");
+        rivals += u32::from(rival);
         let errors = [(found.parameters.tau, 0.8, 1), (found.parameters.theta, 15.0, 2)]
             .map(|(value, truth, i)| (value - truth).abs() / found.unknowns[i].knowledge.standard_error().unwrap());
         // Four standard errors: one of 500 such fits by chance.
         assert!(errors.into_iter().all(|errors| errors < 4.0), "{seed}: {errors:?} {found}");
     }
+    assert!(rivals <= 5, "{rivals}");
 }
 
 /// An input that changes at every sample: the cost has a minimum between any two whole numbers of samples, of which a single search may end in
