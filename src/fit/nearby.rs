@@ -1,12 +1,14 @@
 //! Searches from places near an estimate where the cost is not smooth, and may have several minima within the errors of each other.
 
+mod dead_times;
+
 use super::search::{at_end, settled};
 use super::starts::search_from_many;
 use crate::covariance::SearchEnd;
-use crate::estimate::{About, Minimum, Starts, Summary, Unknown, Warning, WarningCode, times_the_cost};
-use crate::judge::{INDISTINGUISHABLE, conclude};
+use crate::estimate::{About, Minimum, Starts, Summary, Warning, WarningCode, times_the_cost};
+use crate::judge::conclude;
 use crate::numeral::number;
-use crate::problem::{Control, Lead, Problem, Role, SearchPlan, Settings};
+use crate::problem::{Control, Lead, Problem, SearchPlan, Settings};
 use crate::random::Random;
 use crate::severity::Severity;
 use std::time::Instant;
@@ -23,17 +25,6 @@ const LONGEST_IN_LANES: usize = 100_000;
 const LONGEST: usize = 5_000;
 const ROUGH: &str = "the errors are colored, and the cost does not rise as its slopes say beside";
 
-/// Distances from a dead time, in samples. Where inputs are held, the cost has a kink where the dead time is a whole number of samples, and may have a
-/// minimum between any two of these: of 40 lags of ten samples, with white inputs and a dead time that began 1.3 samples off, 19 ended in a wrong one.
-const SAMPLES_BESIDE: [f64; 4] = [-1.5, -0.5, 0.5, 1.5];
-/// The part of a dead time by which a parameter is moved to see whether it moves one.
-const MOVED: f64 = 1e-6;
-/// The most dead times that are searched beside.
-const MOST_DEAD_TIMES: usize = 2;
-
-/// The standard errors from which on another minimum is apart from an estimate: nearer ones are on both sides of one whole number of samples.
-const OUTSIDE: f64 = 3.0;
-
 /// Why searches begin near an estimate.
 #[derive(Clone, Copy, PartialEq)]
 enum Reason {
@@ -42,9 +33,9 @@ enum Reason {
 }
 
 impl Problem<'_> {
-    /// The estimate at the lowest minimum that searches from places near an estimate find, with a warning; the same estimate where none is lower.
-    /// Both with the evaluations of all searches. `None` where no such search is made: no dead time is sought, and errors are not colored or the cost rises as
-    /// its slopes say, or the records are long.
+    /// The estimate at the lowest minimum that searches from places near an estimate find; the same estimate where none is lower. Both with the
+    /// evaluations of all searches. Searches are made where errors are colored and the cost does not rise as its slopes say, and where a dead time is an
+    /// unknown. `None` elsewhere, for long records, for filters, and where no search finds a minimum that is as good as the end before.
     pub(super) fn searched_nearby(&self, found: &Summary, control: &Control) -> Option<Summary> {
         let longest = if self.runs_in_lanes() { LONGEST_IN_LANES } else { LONGEST };
         if self.settings.searches == SearchPlan::All(1)
@@ -82,53 +73,18 @@ impl Problem<'_> {
         if lower {
             let end = settled(&plain, SearchEnd { starts: asked.then(|| starts.clone()), ..end });
             best = conclude(&at_end(&plain, &end), &end, 0.0).ok()?;
+            // An end that is no minimum may still be lower than each minimum that was found.
+            if before.is_none() && is_higher(&best, found) {
+                return None;
+            }
         }
         best.warnings.extend(match reason {
             Reason::Rough => Some(rough(&starts, before.filter(|_| lower))),
-            Reason::DeadTime => beside(&starts, before.filter(|_| lower), &best, tried),
+            Reason::DeadTime => dead_times::warning(&starts, before.filter(|_| lower), &best, tried),
         });
         let seconds = found.seconds + begin.elapsed().as_secs_f64();
         let iterations = found.iterations + if lower { best.iterations } else { 0 };
         Some(Summary { iterations, evaluations, seconds, ..best })
-    }
-
-    /// Coordinates of places at which the dead times of inputs that a parameter moves are some samples from those of an estimate; `None` if there is none.
-    fn beside_dead_times(&self, found: &Summary) -> Option<Vec<Vec<f64>>> {
-        let record = self.records.first()?;
-        let step = (record.time(record.len() - 1) - record.time(0)) / (record.len() - 1) as f64;
-        let at: Vec<f64> =
-            found.unknowns.iter().map(|unknown| unknown.transform.to_coordinate(unknown.value)).collect();
-        let late = |at: &[f64], e: usize| self.sweep.late(&self.unknowns.of_experiment(e, at).p);
-        let mut places = vec![];
-        let (mut moved, bounds) = (0, self.unknowns.bounds());
-        for (i, unknown) in found.unknowns.iter().enumerate() {
-            let row = &self.unknowns.row[i];
-            if !matches!(row.role, Role::Parameter(_)) {
-                continue;
-            }
-            let e = row.experiment.unwrap_or(0);
-            let place = |value: f64| {
-                let mut place = at.clone();
-                place[i] = unknown.transform.to_coordinate(value).max(bounds[i].0).min(bounds[i].1);
-                place
-            };
-            let far = MOVED * unknown.value.abs().max(step);
-            let (here, there) = (late(&at, e), late(&place(unknown.value + far), e));
-            let slopes = here
-                .iter()
-                .zip(&there)
-                .filter_map(|(here, there)| Some((*here)?.max((*there)?) - (*here)?.min((*there)?)));
-            let slope = slopes.fold(0.0, f64::max) / far;
-            if slope == 0.0 {
-                continue;
-            }
-            moved += 1;
-            let is_late = |place: &Vec<f64>| late(place, e).iter().flatten().all(|time| *time >= 0.0);
-            places.extend(
-                SAMPLES_BESIDE.map(|samples| place(unknown.value + samples * step / slope)).into_iter().filter(is_late),
-            );
-        }
-        (1..=MOST_DEAD_TIMES).contains(&moved).then_some(places).filter(|places| !places.is_empty())
     }
 
     /// Coordinates of places near an estimate; `None` where an unknown has no standard error.
@@ -153,7 +109,15 @@ fn is_rough(found: &Summary) -> bool {
     is_warned(WarningCode::ColoredErrors) && is_warned(WarningCode::CurvedInterval) && found.outcome.converged()
 }
 
-/// A minimum in words.
+/// Whether the data are explained less well: by `-2 ln` of the likelihood, or, with a loss or weights, by the cost.
+fn is_higher(one: &Summary, other: &Summary) -> bool {
+    match (one.deviance, other.deviance) {
+        (Some(one), Some(other)) => one > other,
+        _ => one.cost > other.cost,
+    }
+}
+
+/// How much higher the cost is at a minimum, and where it lies.
 fn at(minimum: &Minimum) -> String {
     let place = minimum.unknowns.iter().map(|(name, value)| format!("`{name}` = {}", number(*value, 5)));
     format!("{} at {}", times_the_cost(minimum.cost_ratio), place.collect::<Vec<_>>().join(", "))
@@ -181,33 +145,6 @@ fn rough(starts: &Starts, before: Option<&Minimum>) -> Warning {
         ),
     };
     Warning::new(WarningCode::DeclaredStartElsewhere, severity, text).about(About::Minimum)
-}
-
-/// What is said of searches from other dead times: another minimum that the data do not tell from the best one, with an unknown outside its interval, or the
-/// one before.
-fn beside(starts: &Starts, before: Option<&Minimum>, best: &Summary, tried: usize) -> Option<Warning> {
-    let is_outside = |(unknown, (_, value)): (&Unknown, &(String, f64))| {
-        let error = unknown.knowledge.standard_error();
-        error.is_some_and(|error| (value - unknown.value).abs() > OUTSIDE * error)
-    };
-    let is_apart = |minimum: &Minimum| best.unknowns.iter().zip(&minimum.unknowns).any(is_outside);
-    let is_as_good = |minimum: &Minimum| best.measurements as f64 * minimum.cost_ratio.ln() < INDISTINGUISHABLE;
-    let rival = |minimum: &&Minimum| is_as_good(minimum) && is_apart(minimum);
-    if let Some(rival) = starts.minima.iter().skip(1).find(rival) {
-        let text = format!(
-            "another minimum explains the data as well, with {}, between other whole numbers of samples of a dead time: an interval holds for one of them \
-             alone; profile the dead time, or use an input that changes less often",
-            at(rival)
-        );
-        return Some(Warning::new(WarningCode::RivalMinimum, Severity::UsableWithCare, text).about(About::Minimum));
-    }
-    let text = format!(
-        "the search ended first in another minimum, with {}, beside a whole number of samples of a dead time: of {tried} searches from dead times near it {} to \
-         this one",
-        at(before?),
-        led(starts)
-    );
-    Some(Warning::new(WarningCode::DeclaredStartElsewhere, Severity::Usable, text).about(About::Minimum))
 }
 
 /// Minima from which searches go on: that of an estimate, others that were found with it, and these places.

@@ -44,17 +44,10 @@ impl DataFile {
         let samples = rows.map_or(cells.len(), <[usize]>::len);
         let column = file.names()[at].clone();
         match cells {
-            Cells::Numbers(_) | Cells::Whole(_) => {
-                let number = |sample: usize| match cells {
-                    Cells::Numbers(numbers) => Count::Number(numbers[row(sample)]),
-                    Cells::Whole(counts) => counts[row(sample)].map_or(Count::Number(f64::NAN), Count::Whole),
-                    _ => Count::Number(f64::NAN),
-                };
-                let first = if samples == 0 { Count::Number(0.0) } else { number(0) };
-                let Some(ticks) = self.ticks(file.names(), file.unit(at), at, first)? else { return Ok(even(1.0)) };
-                let stamps = (0..samples).map(|sample| ticks.time(number(sample))).collect();
-                let source = TimeSource::Numbers { column, unit: ticks.unit, origin: ticks.origin };
-                Ok(((Time::from_stamps(stamps), ticks.shown), source))
+            Cells::Numbers(numbers) => self.counted(at, file, samples, |sample| Count::Number(numbers[row(sample)])),
+            Cells::Whole(counts) => {
+                let none = Count::Number(f64::NAN);
+                self.counted(at, file, samples, |sample| counts[row(sample)].map_or(none, Count::Whole))
             }
             Cells::Seconds(lengths) => {
                 let said = self.said("t");
@@ -83,6 +76,21 @@ impl DataFile {
                 self.stamps(column, samples, |sample| Stamp::read(&texts[row(sample)]), |sample| Some(text(sample)))
             }
         }
+    }
+
+    /// The times of the numbers of samples.
+    fn counted(
+        &self,
+        at: usize,
+        file: &dyn Columns,
+        samples: usize,
+        count: impl Fn(usize) -> Count,
+    ) -> Result<Times, Error> {
+        let first = if samples == 0 { Count::Number(0.0) } else { count(0) };
+        let Some(ticks) = self.ticks(file.names(), file.unit(at), at, first)? else { return Ok(even(1.0)) };
+        let stamps = (0..samples).map(|sample| ticks.time(count(sample))).collect();
+        let source = TimeSource::Numbers { column: file.names()[at].clone(), unit: ticks.unit, origin: ticks.origin };
+        Ok(((Time::from_stamps(stamps), ticks.shown), source))
     }
 
     /// The times of the dates of samples, which have these stamps and texts.
