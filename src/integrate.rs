@@ -22,7 +22,7 @@ pub(crate) use method::{Duals, Field, Method, Rate, Slopes, SymbolicField, autom
 pub use rk4::Rk4;
 pub use rk45::Rk45;
 #[cfg(feature = "std")]
-pub(crate) use stiff::Stiff;
+use stiff::Stiff;
 pub use system::{ModelSystem, Square, System};
 use tolerance::Tolerance;
 

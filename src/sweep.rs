@@ -17,7 +17,7 @@ mod window;
 
 pub(crate) use duals::DualSweep;
 pub(crate) use failure::OVERFLOW;
-pub(crate) use loops::{Loops, Narrow};
+pub(crate) use loops::Loops;
 pub(crate) use made::{compiled, of_equations};
 pub(crate) use model_code::{Evaluated, ModelCode, Typed};
 pub(crate) use programs::{Derived, Interleaved, ProgramSweep};

@@ -21,13 +21,6 @@ pub struct Computed {
     pub text: String,
 }
 
-/// An unknown parameter in which a quantity has no slope, and the ends of what it may be.
-struct Flat<'a> {
-    place: usize,
-    name: &'a str,
-    ends: [f64; 2],
-}
-
 /// Reads what the command line says, before a fit.
 pub fn expressions(said: &[(String, String)], model: &Model) -> Result<Vec<Expression>, Failure> {
     let read = |(k, (name, text)): (usize, &(String, String))| -> Result<Expression, Failure> {
@@ -83,26 +76,24 @@ impl Expression {
     fn at(&self, derived: Derived, parameters: &[ParameterEstimate]) -> Computed {
         let unknown = self.unknown(parameters);
         let flat = self.flat(&unknown, parameters);
-        let names = || flat.iter().map(|one| format!("`{}`", one.name)).collect::<Vec<_>>().join(", ");
-        let value = || format!("{} = {}", derived.name, Cell::number(derived.value, 6).text());
-        if !derived.value.is_finite() {
-            let text = format!("{}: its expression is no finite number at the estimate", derived.name);
-            return Computed { derived, text };
-        }
-        if self.changes(&flat, parameters) {
-            let text = format!(
-                "{}, not known: it changes within what is known of {}, but has no slope there at the estimate (an `if`, a limit, a rounding)",
-                value(),
-                names()
-            );
-            return Computed { derived: Derived { standard_error: None, interval: None, ..derived }, text };
-        }
+        let named =
+            |all: &[usize]| all.iter().map(|j| format!("`{}`", parameters[*j].name)).collect::<Vec<_>>().join(", ");
+        let value = format!("{} = {}", derived.name, Cell::number(derived.value, 6).text());
+        let is_known = |j: &usize| flat.contains(j) || parameters[*j].knowledge.standard_error().is_some();
         let text = match (derived.standard_error, derived.interval) {
+            _ if !derived.value.is_finite() => {
+                format!("{}: its expression is no finite number at the estimate", derived.name)
+            }
             (Some(_), Some(_)) if !flat.is_empty() && flat.len() == unknown.len() => {
-                format!("{}, the same within the 95 % intervals of {}", value(), names())
+                format!("{value}, the same within the 95 % intervals of {}", named(&flat))
             }
             (Some(error), Some(interval)) => with_interval(&derived, error, interval),
-            _ => format!("{}, not known: it depends on a parameter that is not", value()),
+            _ if !flat.is_empty() && unknown.iter().all(is_known) => format!(
+                "{value}, not known: it changes within what is known of {}, but has no slope there at the estimate (an `if`, a limit, a \
+                 rounding)",
+                named(&flat)
+            ),
+            _ => format!("{value}, not known: it depends on a parameter that is not"),
         };
         Computed { derived, text }
     }
@@ -119,27 +110,12 @@ impl Expression {
     }
 
     /// Those in which it has no slope at the estimate.
-    fn flat<'a>(&self, unknown: &[usize], parameters: &'a [ParameterEstimate]) -> Vec<Flat<'a>> {
+    fn flat(&self, unknown: &[usize], parameters: &[ParameterEstimate]) -> Vec<usize> {
         let slope = |place: usize| {
             let leaf = |j: usize| Dual::<1>::variable(parameters[j].value, if j == place { 0 } else { 1 });
             self.evaluate(leaf).slopes[0]
         };
-        let flat = unknown.iter().filter(|place| slope(**place) == 0.0);
-        flat.map(|&place| Flat { place, name: &parameters[place].name, ends: ends(&parameters[place]) }).collect()
-    }
-
-    /// Whether other values of one or two of these change it.
-    fn changes(&self, flat: &[Flat<'_>], parameters: &[ParameterEstimate]) -> bool {
-        let at = |moved: [(usize, f64); 2]| {
-            let value = |j: usize| moved.iter().find(|(place, _)| *place == j).map(|(_, end)| *end);
-            self.evaluate(|j| value(j).unwrap_or(parameters[j].value))
-        };
-        let corners = |one: &Flat<'_>, other: &Flat<'_>| {
-            let with = |end: f64| other.ends.map(|other_end| at([(one.place, end), (other.place, other_end)]));
-            one.ends.map(with).concat()
-        };
-        let here = self.evaluate(|j| parameters[j].value);
-        flat.iter().any(|one| flat.iter().any(|other| corners(one, other).iter().any(|value| *value != here)))
+        unknown.iter().copied().filter(|place| slope(*place) == 0.0).collect()
     }
 
     /// Its value in numbers of any type, by those of the parameters in their places.
@@ -149,16 +125,6 @@ impl Expression {
             _ => S::from(f64::NAN),
         };
         self.graph.evaluate(&[self.root], leaf).first().copied().unwrap_or(S::from(f64::NAN))
-    }
-}
-
-/// The ends of what a parameter may be: its 95 % interval, or its bounds where it has none.
-fn ends(one: &ParameterEstimate) -> [f64; 2] {
-    match one.knowledge {
-        Knowledge::Known { lower, upper, .. } => [lower, upper],
-        Knowledge::Held { bound, end } => [bound, end.unwrap_or(bound)],
-        Knowledge::Fixed => [one.value; 2],
-        Knowledge::Unidentified => [one.declared.lower, one.declared.upper],
     }
 }
 

@@ -109,7 +109,7 @@ impl Sizes {
     }
 
     /// The unknown whose variance differs most from the classical one, of those that are not `held`, by a test with this variance of the
-    /// squares at this level.
+    /// squares at this level: one whose classical interval is too short before those whose is too long.
     fn most(&self, held: &[bool], of_squares: f64, level: f64) -> Option<Uneven> {
         let tested: Vec<usize> = (0..self.of.len()).filter(|&i| !held[i]).collect();
         let of = |&unknown: &usize| {
@@ -118,7 +118,8 @@ impl Sizes {
             (p_value < level).then_some(Uneven { unknown, factor, p_value })
         };
         let far = |one: &Uneven| one.factor.ln().abs();
-        tested.iter().filter_map(of).max_by(|a, b| far(a).total_cmp(&far(b)))
+        let too_short = |one: &Uneven| one.factor > 1.0;
+        tested.iter().filter_map(of).max_by(|a, b| too_short(a).cmp(&too_short(b)).then(far(a).total_cmp(&far(b))))
     }
 
     /// Whether the classical covariance may be wrong.
@@ -129,6 +130,12 @@ impl Sizes {
     /// The unknown of which it certainly is wrong, and by most.
     pub fn uneven(&self, held: &[bool]) -> Option<Uneven> {
         self.most(held, self.variance_of_squares(), SAID)
+    }
+
+    /// The unknown whose interval certainly is too short, and by most, if the errors are normal: where no other covariance takes the place of the classical one,
+    /// what errors of changing size add to the variance of their squares must not hide them.
+    pub fn too_short(&self, held: &[bool]) -> Option<Uneven> {
+        self.most(held, NORMAL, SAID).filter(|one| one.factor > 1.0)
     }
 }
 

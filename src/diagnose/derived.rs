@@ -1,7 +1,7 @@
 //! Delta method: how well a function of the parameters is known, by its exact slopes.
 
 use crate::dual::Dual;
-use crate::estimate::{Derived, Estimate, Summary, Unknown, student};
+use crate::estimate::{Derived, Estimate, Knowledge, Summary, Unknown, student};
 use crate::graph::{Graph, Id, Leaf};
 use crate::model::Model;
 use crate::parameter::Transform;
@@ -10,9 +10,12 @@ use crate::signals::{Of, Signals};
 
 /// Slopes taken at once.
 const LANES: usize = 8;
+/// Of more parameters without slope only one at a time is moved.
+const PAIRED: usize = 32;
 
 /// A function of the parameters with its interval: `derived(&estimate, "kt", |p| p.ke * 1.5)`. Parameters that each
-/// experiment has for itself are those of the first; fixed ones count as exact.
+/// experiment has for itself are those of the first; fixed ones count as exact. There is no interval where it depends on a parameter that has none, nor where it
+/// changes within the intervals of parameters in which it has no slope: by an `if`, a limit, a rounding.
 ///
 /// ```
 /// # use greybox::{Experiment, Fit, free, pmsm::{Surface, Winding}};
@@ -95,10 +98,39 @@ fn of(estimate: &Summary, experiment: usize, name: &str, f: &dyn Fn(&[Dual<LANES
     let c = estimate.covariance.dense(&moved);
     let pairs = (0..moved.len()).flat_map(|a| (0..moved.len()).map(move |b| (a, b)));
     let variance: f64 = pairs.map(|(a, b)| gradient[moved[a]] * c[(a, b)] * gradient[moved[b]]).sum();
+    let flat = |j: &usize| unknown(*j).is_some_and(|i| gradient[i] == 0.0);
+    let flat: Vec<(usize, [f64; 2])> =
+        (0..parameters).filter(flat).filter_map(|j| Some((j, ends(&estimate.unknowns[unknown(j)?])))).collect();
+    let known = known && !steps(&values, value, &flat, f);
     let standard_error = Some(variance.max(0.0).sqrt()).filter(|error| known && error.is_finite() && value.is_finite());
     let degrees = moved.iter().map(|&i| estimate.unknowns[i].degrees_of_freedom);
     let degrees = degrees.fold(estimate.degrees_of_freedom(), f64::min);
     let interval = standard_error
         .map(|standard_error| student::Spread { standard_error, degrees }.interval(value, Transform::Identity, 0.95));
     Derived { name: name.to_owned(), value, standard_error, interval }
+}
+
+/// Whether other values of one or two parameters without slope, between the ends of what these may be, change the quantity.
+fn steps(values: &[f64], here: f64, flat: &[(usize, [f64; 2])], f: &dyn Fn(&[Dual<LANES>]) -> Dual<LANES>) -> bool {
+    let changes = |moved: &[(usize, f64)]| {
+        let mut there: Vec<Dual<LANES>> = values.iter().map(|value| Dual::constant(*value)).collect();
+        moved.iter().for_each(|(j, end)| there[*j] = Dual::constant(*end));
+        f(&there).value != here
+    };
+    let of = |(j, ends): &(usize, [f64; 2])| ends.map(|end| (*j, end));
+    let alone = flat.iter().flat_map(of).any(|one| changes(&[one]));
+    let pairs = || flat.iter().enumerate().flat_map(|(n, one)| flat[..n].iter().map(move |other| (one, other)));
+    let together =
+        |(one, other)| of(one).into_iter().any(|one| of(other).into_iter().any(|other| changes(&[one, other])));
+    here.is_finite() && (alone || flat.len() <= PAIRED && pairs().any(together))
+}
+
+/// The ends of what an unknown may be: its 95 % interval, or its bounds where it has none.
+fn ends(one: &Unknown) -> [f64; 2] {
+    match one.knowledge {
+        Knowledge::Known { lower, upper, .. } => [lower, upper],
+        Knowledge::Held { bound, end } => [bound, end.unwrap_or(bound)],
+        Knowledge::Fixed => [one.value; 2],
+        Knowledge::Unidentified => [one.bounds.0, one.bounds.1],
+    }
 }

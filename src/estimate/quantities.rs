@@ -169,7 +169,8 @@ pub struct Derived {
     #[serde(with = "crate::real")]
     pub value: f64,
     /// Its standard error, to first order (Rao, *Linear Statistical Inference and Its Applications*, 1973, section 6a.2);
-    /// `None` if it depends on a parameter that has none because it is held or not determined, or is not a number.
+    /// `None` if it depends on a parameter that has none because it is held or not determined, changes within the interval of one in which it has no slope, or is
+    /// not a number.
     #[serde(with = "crate::real")]
     pub standard_error: Option<f64>,
     /// The 95 % interval by Student's t.

@@ -5,7 +5,7 @@ use crate::error::Error;
 use crate::estimate::{Estimate, Summary};
 use crate::experiment::ExperimentOf;
 use crate::functions::Handle;
-use crate::integrate::{Automatic, Integrator, Method, Rk4, Stiff, automatic, exact, stiff};
+use crate::integrate::{Automatic, Integrator, Method, Rk4, automatic, exact, stiff};
 use crate::layout::{Kind, Layout};
 use crate::model::Model;
 use crate::parameter::Parameter;
@@ -13,7 +13,7 @@ use crate::predict::{Prediction, Predictor, simulation};
 use crate::problem::{FinerSweeps, SUBSTEPS};
 use crate::record::Record;
 use crate::signals::{Of, Signals};
-use crate::sweep::{DualSweep, Loops, Narrow, Sweep, Typed, compiled, of_equations};
+use crate::sweep::{DualSweep, Loops, Sweep, Typed, compiled, of_equations};
 use std::sync::{Arc, OnceLock};
 
 /// What can be fitted: a Rust [`Model`], [`Equations`] that are known at run time, or a [`Sweep`] of one's own behind an `Arc`.
@@ -164,16 +164,17 @@ impl AnyStepping {
     }
 }
 
-/// An integrator of a Rust model: compiled into the loop over a model's samples, and as a trait object.
+/// An integrator of a Rust model: as a trait object, and compiled into the loop over a model's samples. The implicit method that follows the others is not:
+/// its steps are long, and the loop would be a third of what is compiled for each model.
 pub struct Stepping<M: Model> {
-    loops: Arc<dyn Loops<M>>,
+    loops: Option<Arc<dyn Loops<M>>>,
     method: Arc<dyn Method>,
 }
 
 impl<M: Model> Stepping<M> {
     /// The default, with this number of steps per sample.
     fn automatic(substeps: u32) -> Self {
-        Stepping { loops: Arc::new(Automatic { continuous: Rk4 { substeps } }), method: automatic(substeps) }
+        Stepping { loops: Some(Arc::new(Automatic { continuous: Rk4 { substeps } })), method: automatic(substeps) }
     }
 }
 
@@ -216,7 +217,7 @@ impl<M: Model> Made for M {
     }
 
     fn stepping(integrator: impl Integrator) -> Stepping<M> {
-        Stepping { loops: Arc::new(integrator.clone()), method: Arc::new(integrator) }
+        Stepping { loops: Some(Arc::new(integrator.clone())), method: Arc::new(integrator) }
     }
 
     fn exact(&self) -> Option<Stepping<M>> {
@@ -225,7 +226,7 @@ impl<M: Model> Made for M {
     }
 
     fn finer(&self, crosses: bool) -> Vec<(usize, Stepping<M>)> {
-        let stiff = Stepping { loops: Arc::new(Narrow(Stiff::default())), method: stiff() };
+        let stiff = Stepping { loops: None, method: stiff() };
         following(crosses.then(|| self.exact()).flatten(), Stepping::automatic, stiff)
     }
 

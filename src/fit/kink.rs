@@ -1,5 +1,5 @@
 //! Minima at a kink of the cost: where a held input acts late by a whole number of samples, the slope with respect to the dead time jumps, and the cost may
-//! rise on both sides.
+//! rise on both sides. So it does with respect to a limit in a condition of the model, such as that of a dead zone, where the limit is what a sample measured.
 
 use crate::optimize::{Domain, LeastSquares, LevenbergMarquardt, Linearization, Machine, Request, Stop};
 use crate::problem::{Objective, Role, Round};
@@ -15,18 +15,20 @@ const SEARCHES: usize = 3;
 /// Most trial steps of each, which begins near a minimum.
 const TRIALS: u64 = 200;
 
-/// The end of a round as a minimum, if the model has dead times and the cost a kink where no step lowers it: the unknowns whose slopes jump there are held, and
-/// the others searched. At the minimum that is found, the cost has to fall towards the kink from both sides. `None` where it is none.
+/// The end of a round as a minimum, if the model has dead times or parameters in its conditions, and the cost a kink where no step lowers it: the unknowns whose
+/// slopes jump there are held, and the others searched. At the minimum that is found, the cost has to fall towards the kink from both sides. `None` where it is none.
 pub(super) fn at_kink(objective: &Objective<'_>, round: &Round) -> Option<Round> {
     let values = objective.values_of(0, &round.coordinates);
-    if objective.sweep.late(&values.p).is_empty() {
+    let late = !objective.sweep.late(&values.p).is_empty();
+    let choosing = objective.sweep.choosing().unwrap_or_default();
+    // An initial state moves no dead time, nor a limit.
+    let may_jump = |role: &Role| matches!(role, Role::Parameter(p) if late || choosing.contains(p));
+    let unknowns = objective.problem.unknowns.row.iter().enumerate();
+    let parameters: Vec<usize> = unknowns.filter(|(_, unknown)| may_jump(&unknown.role)).map(|(i, _)| i).collect();
+    if parameters.is_empty() {
         return None;
     }
     let mut round = round.clone();
-    // An initial state moves no dead time.
-    let unknowns = objective.problem.unknowns.row.iter().enumerate();
-    let parameters: Vec<usize> =
-        unknowns.filter(|(_, unknown)| matches!(unknown.role, Role::Parameter(_))).map(|(i, _)| i).collect();
     for _ in 0..SEARCHES {
         round.evaluations += 2 * parameters.len() as u64;
         let jumps = |i: &usize| Slopes::beside(objective, &round.coordinates, *i).is_some_and(Slopes::jump);

@@ -32,6 +32,7 @@ mod step;
 mod suspicions;
 #[cfg(test)]
 mod tests;
+mod twice;
 mod weights;
 mod within_loss;
 
@@ -58,7 +59,7 @@ pub(crate) const CHECKS: &[Check] = &[
     data::COARSE,
     suspicions::INPUT_SENTINELS,
     data::MISSING_PART,
-    copies::TWICE,
+    twice::TWICE,
     copies::COPIES,
     explained::UNEXPLAINED,
     explained::GIVEN_NOISE,

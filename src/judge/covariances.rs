@@ -176,7 +176,10 @@ fn for_white_errors(
     let x = &end.coordinates;
     let (factor, degrees) = estimated_weights(evidence);
     let degrees = vec![degrees; evidence.point.slopes.len()];
-    let uneven = tested(evidence).and_then(|(_, sizes)| sizes.uneven(held));
+    let uneven = tested(evidence).and_then(|(_, sizes)| match evidence.point.is_static() {
+        true => sizes.too_short(held).or_else(|| sizes.uneven(held)),
+        false => sizes.uneven(held),
+    });
     let shares = tested(evidence).map(|(shares, _)| shares.clone());
     // Where stop conditions ended a pass, the classical covariance, which needs none, takes its place.
     let stopped = || objective.control.stops();

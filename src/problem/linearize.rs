@@ -15,9 +15,9 @@ use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::Arc;
 
-/// A change of the predictions below this part of the residual cannot be told from rounding: with noise of a percent of the output it is
-/// 1e-12 of the output.
-const FORGOTTEN: f64 = 1e-10;
+/// Changes of all predictions whose root of the sum of squares is below this part of the root mean square error are nothing that the data tell of: they move another
+/// unknown by less than this part of its standard error, while a search would follow the noise over a thousand times what the initial state may be.
+const FORGOTTEN: f64 = 1e-3;
 
 /// Cost, triangle and final carry of one segment.
 pub(super) struct Part<T = Information> {
@@ -135,7 +135,7 @@ impl Objective<'_> {
     }
 
     /// Leaves out the slopes of initial states that have decayed before the first measurement, and returns these unknowns: a change by the size
-    /// of the state moves the predictions by less than the rounding of the residual, so that a search for it would have no end.
+    /// of the state moves the predictions by less than the data tell of.
     fn without_forgotten(&self, coordinates: &[f64], blocks: &mut [Information]) -> Vec<usize> {
         let mut forgotten = vec![];
         let begins_late = |e: &usize| self.problem.records[*e].outputs().iter().all(|output| output.values[0].is_nan());
@@ -143,7 +143,8 @@ impl Objective<'_> {
         if late.is_empty() {
             return forgotten;
         }
-        let residual = blocks.iter().map(Information::residual_at_zero).sum::<f64>().sqrt();
+        let squares: f64 = blocks.iter().map(Information::residual_at_zero).sum();
+        let error = (squares / blocks.iter().map(Information::rows).sum::<u64>() as f64).sqrt();
         for e in late {
             let columns: Vec<usize> = self.problem.unknowns.columns(e).collect();
             let norms = blocks[e].column_norms();
@@ -152,7 +153,7 @@ impl Objective<'_> {
                 let Free { role, parameter, .. } = &self.problem.unknowns.row[*i];
                 let plain = parameter.prior.is_none() && parameter.transform == Transform::Identity;
                 let size = coordinates[*i].abs().max(parameter.start.abs()).max(reach);
-                plain && matches!(role, Role::InitialState(_)) && *norm > 0.0 && norm * size < FORGOTTEN * residual
+                plain && matches!(role, Role::InitialState(_)) && *norm > 0.0 && norm * size < FORGOTTEN * error
             };
             let left_out: Vec<bool> = norms.iter().zip(&columns).map(decayed).collect();
             if left_out.contains(&true) {

@@ -171,32 +171,6 @@ impl<M: Model, I: Integrator> Loops<M> for I {
     }
 }
 
-/// An integrator whose loop is compiled for values and for four slopes only, portably: for a method that few fits use, compile
-/// time counts more than speed.
-pub(crate) struct Narrow<I>(pub I);
-
-impl<M: Model, I: Integrator> Loops<M> for Narrow<I> {
-    fn run(
-        &self,
-        model: &M,
-        piece: &Piece<'_>,
-        seeds: &[Seed],
-        restart: Option<usize>,
-        visit: Visit<'_>,
-    ) -> Result<Reached, RunError> {
-        let task = Task { model, integrator: &self.0, piece, seeds, restart };
-        let passes = match seeds.len() {
-            0 => task.passes::<f64>(Portable),
-            _ => task.passes::<Dual<4>>(Portable),
-        };
-        task.run_windows(passes, visit)
-    }
-
-    fn refined(&self, kind: Kind) -> Option<Arc<dyn Loops<M>>> {
-        Some(Arc::new(Narrow(Integrator::refined(&self.0, kind)?)))
-    }
-}
-
 /// A piece and how it is to be run.
 struct Task<'t, M: Model, I> {
     model: &'t M,

@@ -54,10 +54,10 @@ pub(crate) trait ModelCode: Send + Sync {
     fn identity(&self) -> String;
 }
 
-/// A Rust model, with the loop that was compiled for it.
+/// A Rust model, with the loop that was compiled for it and its integrator, if there is one.
 pub(crate) struct Typed<'a, M: Model> {
     pub model: Handle<'a, M>,
-    pub loops: Arc<dyn Loops<M> + 'a>,
+    pub loops: Option<Arc<dyn Loops<M> + 'a>>,
 }
 
 impl<M: Model> ModelCode for Typed<'_, M> {
@@ -71,17 +71,24 @@ impl<M: Model> ModelCode for Typed<'_, M> {
 
     fn run(
         &self,
-        _filter: &Filter<'_>,
+        filter: &Filter<'_>,
         piece: &Piece<'_>,
         seeds: &[Seed],
         restart: Option<usize>,
         visit: Visit<'_>,
     ) -> Result<Reached, RunError> {
-        self.loops.run(&self.model, piece, seeds, restart, visit)
+        match &self.loops {
+            Some(loops) => loops.run(&self.model, piece, seeds, restart, visit),
+            None => filter.run(piece, seeds, restart, visit),
+        }
     }
 
     fn refined<'s>(&'s self, kind: Kind) -> Option<Arc<dyn ModelCode + 's>> {
-        Some(Arc::new(Typed { model: self.model.clone(), loops: self.loops.refined(kind)? }))
+        let loops = match &self.loops {
+            Some(loops) => Some(loops.refined(kind)?),
+            None => None,
+        };
+        Some(Arc::new(Typed { model: self.model.clone(), loops }))
     }
 
     /// Others are evaluated from their graph, or refused.

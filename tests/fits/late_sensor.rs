@@ -25,11 +25,11 @@ impl Model for Cubic {
     }
 }
 
-/// After 25 and more time constants a change of the initial state by itself moves the outputs by a part of 1e-11 or less: it is said not to be
+/// After 15 and more time constants a change of the initial state by itself moves the outputs by 1e-5 of their noise or less: it is said not to be
 /// known, the parameters are.
 #[test]
 fn an_initial_state_that_has_died_out_does_not_keep_a_fit_from_its_end() {
-    for (seed, late) in [(1, 100), (2, 150), (3, 200), (4, 300)] {
+    for (seed, late) in [(1, 100), (2, 150), (3, 200), (4, 300), (5, 60), (6, 70), (7, 80)] {
         let mut noise = Noise(seed);
         let inputs: Vec<Drive> = levels(400, 15, seed).into_iter().map(|u| Drive { u: 2.0 * u }).collect();
         let time = Time::Uniform { start: 0.0, step: 0.1 };

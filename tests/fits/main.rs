@@ -16,6 +16,7 @@ mod contradictions;
 mod dc_motor;
 mod declared;
 mod dense_answers;
+mod derived_steps;
 mod equations;
 mod exchanged;
 mod extremes;
@@ -29,6 +30,7 @@ mod initial_functions;
 mod instants;
 mod interval_limits;
 mod judgements;
+mod kinks;
 mod late_sensor;
 mod long_profile;
 #[path = "../common/lorenz.rs"]
@@ -51,6 +53,7 @@ mod sensors;
 #[path = "../common/shared.rs"]
 mod shared;
 mod shooting;
+mod sizes_of_errors;
 #[path = "../common/spiral.rs"]
 mod spiral;
 mod stages;

@@ -1,4 +1,4 @@
-//! Columns and records that are copies of another one.
+//! Columns that are copies of another one.
 
 use super::*;
 use crate::judge::checks::suspicions::NAMED;
@@ -10,19 +10,6 @@ pub(crate) const COPIES: Check = Check::new(
     &[WarningCode::IdenticalColumns],
     |evidence, _| copies(evidence).into(),
 );
-
-pub(crate) const TWICE: Check = Check::new(
-    "no record counts twice",
-    "Do two records hold the same measurements?",
-    &[WarningCode::Repeated],
-    |evidence, _| {
-        let more = evidence.point.objective.experiments() > COMPARED;
-        Examined::from(twice(evidence)).without(more.then_some("records beyond the first 300"))
-    },
-);
-
-/// Of so many records each is compared with each other.
-const COMPARED: usize = 300;
 
 /// The values of an input, or behind these of an output.
 fn column(record: &Record, i: usize) -> &[f64] {
@@ -62,25 +49,8 @@ fn copies(evidence: &Evidence<'_>) -> Vec<Warning> {
     (1..inputs + outputs).filter_map(one).take(NAMED).collect()
 }
 
-/// Whether two records hold the same measurements.
-fn twice(evidence: &Evidence<'_>) -> Option<Warning> {
-    let (records, labels) =
-        (&evidence.point.objective.problem.records, &evidence.point.objective.problem.unknowns.labels);
-    let same = |a: &Record, b: &Record| {
-        are_same(a.outputs().iter().zip(b.outputs()).map(|(a, b)| (&a.values[..], &b.values[..])))
-    };
-    let pairs = (1..records.len().min(COMPARED)).flat_map(|b| (0..b).map(move |a| (a, b)));
-    let (a, b) = pairs.into_iter().find(|&(a, b)| same(&records[a], &records[b]))?;
-    let text = format!(
-        "the experiments `{}` and `{}` hold the same measurements, which count twice: intervals are too narrow; leave one \
-         out",
-        labels[a], labels[b]
-    );
-    Some(with_care(WarningCode::Repeated, text))
-}
-
 /// Whether pairs of columns are the same, and any of them moves.
-fn are_same<'c>(mut pairs: impl Iterator<Item = (&'c [f64], &'c [f64])> + Clone) -> bool {
+pub(super) fn are_same<'c>(mut pairs: impl Iterator<Item = (&'c [f64], &'c [f64])> + Clone) -> bool {
     let equal = |(a, b): (&f64, &f64)| a == b || a.is_nan() && b.is_nan();
     let all = pairs.clone().all(|(a, b)| a.len() == b.len() && a.iter().zip(b).all(equal));
     all && pairs.any(|(a, _)| moves(a))

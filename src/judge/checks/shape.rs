@@ -2,7 +2,9 @@
 //!
 //! The errors of a static model are white in order of an input's size, whatever the order of the samples in time. Those of any model
 //! are uncorrelated with powers of its prediction, and with every input that has acted. A delay or a lag that the model lacks shows at the
-//! samples after each change of an input, a curve that it lacks in the powers of the input.
+//! samples after each change of an input, a curve that it lacks in the powers of the input. What follows so is tested again beside the unknowns, which takes slopes.
+
+mod beside_unknowns;
 
 use super::*;
 use crate::judge::evidence::color;
@@ -22,7 +24,7 @@ pub(crate) const FOLLOWING: Check = Check::new(
     &[WarningCode::WrongShape],
     |evidence, _| Examined::unless(skipped(evidence), || shape(evidence)).without(left_out(evidence)),
 )
-.costs(&[Pass::Values(1)])
+.costs(&[Pass::Values(1), Pass::Slopes(1)])
 .levels(&[
     level(
         "the probability by chance, over all outputs and inputs",
@@ -138,8 +140,32 @@ fn by_inputs_before(evidence: &Evidence<'_>) -> Option<Warning> {
         let part = part * evidence.residuals.outputs[j].rmse / evidence.residuals.levels[j].1;
         (i, j, part, chance * sums.len() as f64)
     };
-    let certain = (0..sums.len()).map(of).filter(|(.., chance)| *chance < color::LIKELY);
-    let (i, j, part, chance) = certain.max_by(|a, b| a.2.total_cmp(&b.2))?;
+    let mut suspicious: Vec<_> = (0..sums.len()).map(of).filter(|(.., chance)| *chance < color::LIKELY).collect();
+    suspicious.sort_by(|a, b| b.2.total_cmp(&a.2));
+    let many = (sums.len() * BEFORE) as f64;
+    let of_errors = &evidence.residuals.first_errors;
+    let beside = |i: usize, j: usize| {
+        let value = |at: &beside_unknowns::Error, before: usize| {
+            let examined = at.output == j && at.sample >= BEFORE;
+            let kept = of_errors.get(at.experiment).and_then(|errors| errors.first()).map_or(0, Vec::len);
+            let value = || objective.problem.records[at.experiment].inputs()[i].values[at.sample - before];
+            (examined && at.sample < kept).then(value)
+        };
+        let powers = || {
+            beside_unknowns::by_chance(evidence, |at| {
+                let one = scales[i].one(value(&at, 1)?);
+                Some(std::array::from_fn::<f64, SHAPE, _>(|power| one.powi(power as i32)))
+            })
+        };
+        let change =
+            |lag: usize| beside_unknowns::by_chance(evidence, |at| Some([value(&at, lag + 1)? - value(&at, lag + 2)?]));
+        match sums[i * outputs + j].most_certain() {
+            0 => powers(),
+            change_before => change(change_before - 1),
+        }
+    };
+    let mut told = suspicious.into_iter().map(|(i, j, part, chance)| (i, j, part, chance.max(beside(i, j) * many)));
+    let (i, j, part, chance) = told.find(|(.., chance)| *chance < color::LIKELY)?;
     let text = format!(
         "the errors of `{}` follow from what the input `{}` was at the samples before ({}): the model lacks a delay, an inertia or a \
          curve, the signals are not of the same moments, or correlated noise is fed back, by {} of what the output moves, and no \
@@ -175,12 +201,24 @@ impl Before {
         }
     }
 
+    /// The root of the part of the squared errors that follows from each, and the probability by chance: from the powers, then from the changes.
+    fn all(&self) -> [(f64, f64); BEFORE] {
+        let squares = self.powers.sum_of_squares();
+        std::array::from_fn(|i| match i.checked_sub(1).map(|lag| &self.changes[lag]) {
+            None => (self.powers.explained_part(), self.powers.by_chance()),
+            Some(change) => (change.explained_part(squares), change.by_chance()),
+        })
+    }
+
+    /// The number of that which they follow from most certainly.
+    fn most_certain(&self) -> usize {
+        let all = self.all();
+        (0..BEFORE).min_by(|a, b| all[*a].1.total_cmp(&all[*b].1)).unwrap_or(0)
+    }
+
     /// The root of the part of the squared errors that follows most certainly, and the probability by chance.
     fn follows(&self) -> (f64, f64) {
-        let squares = self.powers.sum_of_squares();
-        let changes = self.changes.iter().map(|one| (one.explained_part(squares), one.by_chance()));
-        let all = std::iter::once((self.powers.explained_part(), self.powers.by_chance())).chain(changes);
-        let (part, chance) = all.min_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((0.0, 1.0));
+        let (part, chance) = self.all()[self.most_certain()];
         (part, chance * BEFORE as f64)
     }
 }
@@ -210,8 +248,17 @@ fn by_predictions(evidence: &Evidence<'_>) -> Option<Warning> {
             (sums[j].explained_part() * evidence.residuals.outputs[j].rmse, sums[j].by_chance() * count);
         (j, part / evidence.residuals.levels[j].1, chance)
     };
-    let (j, part, chance) =
-        (0..sums.len()).map(of).filter(|(.., chance)| *chance < color::CERTAIN).max_by(|a, b| a.1.total_cmp(&b.1))?;
+    let mut suspicious: Vec<_> = (0..sums.len()).map(of).filter(|(.., chance)| *chance < color::CERTAIN).collect();
+    suspicious.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let beside = |j: usize| {
+        beside_unknowns::by_chance(evidence, |at| {
+            let values = &objective.problem.records[at.experiment].outputs()[j].values;
+            let one = || scales[j].one(values[at.sample] - at.error);
+            (at.output == j).then(|| std::array::from_fn::<f64, SHAPE, _>(|power| one().powi(power as i32)))
+        })
+    };
+    let mut told = suspicious.into_iter().map(|(j, part, chance)| (j, part, chance.max(beside(j) * count)));
+    let (j, part, chance) = told.find(|(.., chance)| *chance < color::CERTAIN)?;
     let text = format!(
         "the errors of `{}` follow from what the model predicts for it ({}): the model has the wrong shape, by {} of what the output \
          moves, and no interval allows for that",

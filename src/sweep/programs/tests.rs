@@ -105,7 +105,7 @@ fn sweeps<M: Model>(model: &M, predictor: impl Predictor, method: Arc<dyn Method
     let evaluated = duals(Arc::new(Evaluated::new(equations.clone())));
     let typed = match predictor.needs_slopes() && !equations.is_affine() {
         true => evaluated.clone(),
-        false => duals(Arc::new(Typed { model: Handle::Borrowed(model), loops: Arc::new(Rk4::default()) })),
+        false => duals(Arc::new(Typed { model: Handle::Borrowed(model), loops: Some(Arc::new(Rk4::default())) })),
     };
     let programs = ProgramSweep::new(equations, method.clone(), predictor.clone(), typed.clone()).unwrap();
     [typed, evaluated, Arc::new(programs)]
