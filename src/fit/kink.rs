@@ -1,6 +1,8 @@
 //! Minima at a kink of the cost: where a held input acts late by a whole number of samples, the slope with respect to the dead time jumps, and the cost may
-//! rise on both sides. So it does with respect to a limit in a condition of the model, such as that of a dead zone, where the limit is what a sample measured.
+//! rise on both sides. So it does with respect to a limit in a condition of a static model, such as that of a dead zone, where the limit is what a sample measured.
+//! Conditions on states, such as those of dry friction, make the cost rugged: its small minima are none of the fit.
 
+use crate::layout::Kind;
 use crate::optimize::{Domain, LeastSquares, LevenbergMarquardt, Linearization, Machine, Request, Stop};
 use crate::problem::{Objective, Role, Round};
 use crate::scaling::OwnSize;
@@ -15,12 +17,15 @@ const SEARCHES: usize = 3;
 /// Most trial steps of each, which begins near a minimum.
 const TRIALS: u64 = 200;
 
-/// The end of a round as a minimum, if the model has dead times or parameters in its conditions, and the cost a kink where no step lowers it: the unknowns whose
+/// The end of a round as a minimum, if the model has dead times, or is static with parameters in its conditions, and the cost has a kink where no step lowers it: the unknowns whose
 /// slopes jump there are held, and the others searched. At the minimum that is found, the cost has to fall towards the kink from both sides. `None` where it is none.
 pub(super) fn at_kink(objective: &Objective<'_>, round: &Round) -> Option<Round> {
     let values = objective.values_of(0, &round.coordinates);
     let late = !objective.sweep.late(&values.p).is_empty();
-    let choosing = objective.sweep.choosing().unwrap_or_default();
+    let choosing = match objective.problem.layout().kind {
+        Kind::Static => objective.sweep.choosing().unwrap_or_default(),
+        Kind::Continuous | Kind::Discrete => &[],
+    };
     // An initial state moves no dead time, nor a limit.
     let may_jump = |role: &Role| matches!(role, Role::Parameter(p) if late || choosing.contains(p));
     let unknowns = objective.problem.unknowns.row.iter().enumerate();

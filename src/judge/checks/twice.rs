@@ -10,8 +10,12 @@ pub(crate) const TWICE: Check = Check::new(
     "Do two records hold the same measurements, whole or in part, some rows left out, or rounded?",
     &[WarningCode::Repeated],
     |evidence, _| {
-        let more = evidence.point.objective.experiments() > COMPARED;
-        Examined::from(twice(evidence)).without(more.then_some("records beyond the first 300"))
+        let left_out = match evidence.point.objective.experiments() {
+            ..=COMPARED_BY_TIME => None,
+            ..=COMPARED => Some("records with fewer rows or rounded, beyond the first 100"),
+            _ => Some("records beyond the first 300, ones with fewer rows or rounded beyond the first 100"),
+        };
+        Examined::from(twice(evidence)).without(left_out)
     },
 )
 .levels(&[level(
@@ -22,6 +26,8 @@ pub(crate) const TWICE: Check = Check::new(
 
 /// Of so many records each is compared with each other.
 const COMPARED: usize = 300;
+/// The same at equal times, where the digits of numbers are looked at.
+const COMPARED_BY_TIME: usize = 100;
 /// Parts of records that are equal though their outputs change so often from sample to sample.
 const CHANGES: usize = 10;
 /// Samples of two records whose times differ by less than this part of the interval are of the same time.
@@ -40,12 +46,13 @@ struct Same {
 fn twice(evidence: &Evidence<'_>) -> Option<Warning> {
     let problem = evidence.point.objective.problem;
     let records = &problem.records[..problem.records.len().min(COMPARED)];
-    let pairs = || (1..records.len()).flat_map(|b| (0..b).map(move |a| (a, b)));
-    let copies =
-        || pairs().find(|&(a, b)| copied(&records[a], &records[b])).map(|records| Same { records, samples: None });
-    let by_time = || pairs().find_map(|(a, b)| at_the_same_times(&records[a], &records[b]).map(|n| ((a, b), n)));
+    let pairs = |most: usize| (1..records.len().min(most)).flat_map(|b| (0..b).map(move |a| (a, b)));
+    let copies = pairs(COMPARED).find(|&(a, b)| copied(&records[a], &records[b]));
+    let copies = copies.map(|records| Same { records, samples: None });
+    let by_time =
+        || pairs(COMPARED_BY_TIME).find_map(|(a, b)| at_the_same_times(&records[a], &records[b]).map(|n| ((a, b), n)));
     let in_part = || by_time().or_else(|| overlapping(records)).map(|(records, n)| Same { records, samples: Some(n) });
-    let Same { records: (a, b), samples } = copies().or_else(in_part)?;
+    let Same { records: (a, b), samples } = copies.or_else(in_part)?;
     let [first, second] = [a, b].map(|e| &problem.unknowns.labels[e]);
     let shared = match samples {
         None => "hold the same measurements, which count twice: intervals are too narrow; leave one out".to_owned(),
