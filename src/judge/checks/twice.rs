@@ -10,10 +10,12 @@ pub(crate) const TWICE: Check = Check::new(
     "Do two records hold the same measurements, whole or in part, some rows left out, or rounded?",
     &[WarningCode::Repeated],
     |evidence, _| {
-        let left_out = match evidence.point.objective.experiments() {
-            ..=COMPARED_BY_TIME => None,
-            ..=COMPARED => Some("records with fewer rows or rounded, beyond the first 100"),
-            _ => Some("records beyond the first 300, ones with fewer rows or rounded beyond the first 100"),
+        let experiments = evidence.point.objective.experiments();
+        let left_out = match experiments > COMPARED {
+            true => Some("records beyond the first 300, ones with fewer rows or rounded beyond the first 100"),
+            false => {
+                (experiments > COMPARED_BY_TIME).then_some("records with fewer rows or rounded, beyond the first 100")
+            }
         };
         Examined::from(twice(evidence)).without(left_out)
     },
