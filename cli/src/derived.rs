@@ -76,8 +76,7 @@ impl Expression {
     fn at(&self, derived: Derived, parameters: &[ParameterEstimate]) -> Computed {
         let unknown = self.unknown(parameters);
         let flat = self.flat(&unknown, parameters);
-        let named =
-            |all: &[usize]| all.iter().map(|j| format!("`{}`", parameters[*j].name)).collect::<Vec<_>>().join(", ");
+        let names = || flat.iter().map(|j| format!("`{}`", parameters[*j].name)).collect::<Vec<_>>().join(", ");
         let value = format!("{} = {}", derived.name, Cell::number(derived.value, 6).text());
         let is_known = |j: &usize| flat.contains(j) || parameters[*j].knowledge.standard_error().is_some();
         let text = match (derived.standard_error, derived.interval) {
@@ -85,13 +84,13 @@ impl Expression {
                 format!("{}: its expression is no finite number at the estimate", derived.name)
             }
             (Some(_), Some(_)) if !flat.is_empty() && flat.len() == unknown.len() => {
-                format!("{value}, the same within the 95 % intervals of {}", named(&flat))
+                format!("{value}, the same within the 95 % intervals of {}", names())
             }
             (Some(error), Some(interval)) => with_interval(&derived, error, interval),
             _ if !flat.is_empty() && unknown.iter().all(is_known) => format!(
                 "{value}, not known: it changes within what is known of {}, but has no slope there at the estimate (an `if`, a limit, a \
                  rounding)",
-                named(&flat)
+                names()
             ),
             _ => format!("{value}, not known: it depends on a parameter that is not"),
         };

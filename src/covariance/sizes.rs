@@ -132,8 +132,8 @@ impl Sizes {
         self.most(held, self.variance_of_squares(), SAID)
     }
 
-    /// The unknown whose interval certainly is too short, and by most, if the errors are normal: where no other covariance takes the place of the classical one,
-    /// what errors of changing size add to the variance of their squares must not hide them.
+    /// The unknown whose classical interval certainly is too short, and by most, by the variance that squares of normal errors have. That found is larger where
+    /// the errors change their size, and so fewer of them would be found: too few where the classical interval stays.
     pub fn too_short(&self, held: &[bool]) -> Option<Uneven> {
         self.most(held, NORMAL, SAID).filter(|one| one.factor > 1.0)
     }

@@ -10,7 +10,7 @@ use crate::signals::{Of, Signals};
 
 /// Slopes taken at once.
 const LANES: usize = 8;
-/// Of more parameters without slope only one at a time is moved.
+/// Up to so many parameters without slope are moved in pairs, too; of more each alone, since the pairs grow with the square.
 const PAIRED: usize = 32;
 
 /// A function of the parameters with its interval: `derived(&estimate, "kt", |p| p.ke * 1.5)`. Parameters that each
@@ -110,7 +110,7 @@ fn of(estimate: &Summary, experiment: usize, name: &str, f: &dyn Fn(&[Dual<LANES
     Derived { name: name.to_owned(), value, standard_error, interval }
 }
 
-/// Whether other values of one or two parameters without slope, between the ends of what these may be, change the quantity.
+/// Whether the quantity is another one where one or two parameters without slope are at the ends of what they may be.
 fn steps(values: &[f64], here: f64, flat: &[(usize, [f64; 2])], f: &dyn Fn(&[Dual<LANES>]) -> Dual<LANES>) -> bool {
     let changes = |moved: &[(usize, f64)]| {
         let mut there: Vec<Dual<LANES>> = values.iter().map(|value| Dual::constant(*value)).collect();

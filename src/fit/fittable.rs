@@ -164,8 +164,8 @@ impl AnyStepping {
     }
 }
 
-/// An integrator of a Rust model: as a trait object, and compiled into the loop over a model's samples. The implicit method that follows the others is not:
-/// its steps are long, and the loop would be a third of what is compiled for each model.
+/// An integrator of a Rust model: as a trait object, and compiled into the loop over a model's samples. The implicit method that follows the others is a trait
+/// object only: few fits use it, and the loop would be compiled for each model.
 pub struct Stepping<M: Model> {
     loops: Option<Arc<dyn Loops<M>>>,
     method: Arc<dyn Method>,

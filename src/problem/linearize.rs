@@ -15,8 +15,8 @@ use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::Arc;
 
-/// Changes of all predictions whose root of the sum of squares is below this part of the root mean square error are nothing that the data tell of: they move another
-/// unknown by less than this part of its standard error, while a search would follow the noise over a thousand times what the initial state may be.
+/// An initial state is held if a change by its size moves the predictions, as the root of the sum of squares, by less than this part of the root mean square
+/// error. It then moves another unknown by less than this part of its standard error, while its own standard error is over a thousand times its size.
 const FORGOTTEN: f64 = 1e-3;
 
 /// Cost, triangle and final carry of one segment.
@@ -134,8 +134,8 @@ impl Objective<'_> {
         }
     }
 
-    /// Leaves out the slopes of initial states that have decayed before the first measurement, and returns these unknowns: a change by the size
-    /// of the state moves the predictions by less than the data tell of.
+    /// Leaves out the slopes of initial states that have decayed before the first measurement ([`FORGOTTEN`]), and returns these unknowns: the data do not determine
+    /// them, and a search would have no end.
     fn without_forgotten(&self, coordinates: &[f64], blocks: &mut [Information]) -> Vec<usize> {
         let mut forgotten = vec![];
         let begins_late = |e: &usize| self.problem.records[*e].outputs().iter().all(|output| output.values[0].is_nan());

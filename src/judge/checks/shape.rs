@@ -2,7 +2,7 @@
 //!
 //! The errors of a static model are white in order of an input's size, whatever the order of the samples in time. Those of any model
 //! are uncorrelated with powers of its prediction, and with every input that has acted. A delay or a lag that the model lacks shows at the
-//! samples after each change of an input, a curve that it lacks in the powers of the input. What follows so is tested again beside the unknowns, which takes slopes.
+//! samples after each change of an input, a curve that it lacks in the powers of the input. Errors that do follow are tested again with the slopes of the unknowns.
 
 mod beside_unknowns;
 
@@ -136,36 +136,31 @@ fn by_inputs_before(evidence: &Evidence<'_>) -> Option<Warning> {
     }
     let of = |number: usize| {
         let (i, j) = (number / outputs, number % outputs);
-        let (part, chance) = sums[number].follows();
+        let (change, part, chance) = sums[number].follows();
         let part = part * evidence.residuals.outputs[j].rmse / evidence.residuals.levels[j].1;
-        (i, j, part, chance * sums.len() as f64)
+        ((i, j, change), part, chance * sums.len() as f64)
     };
     let mut suspicious: Vec<_> = (0..sums.len()).map(of).filter(|(.., chance)| *chance < color::LIKELY).collect();
-    suspicious.sort_by(|a, b| b.2.total_cmp(&a.2));
+    suspicious.sort_by(|a, b| b.1.total_cmp(&a.1));
     let many = (sums.len() * BEFORE) as f64;
     let of_errors = &evidence.residuals.first_errors;
-    let beside = |i: usize, j: usize| {
-        let value = |at: &beside_unknowns::Error, before: usize| {
+    let beside = |(i, j, change): (usize, usize, Option<usize>)| {
+        let value = |at: &beside_unknowns::Measured, before: usize| {
             let examined = at.output == j && at.sample >= BEFORE;
             let kept = of_errors.get(at.experiment).and_then(|errors| errors.first()).map_or(0, Vec::len);
             let value = || objective.problem.records[at.experiment].inputs()[i].values[at.sample - before];
             (examined && at.sample < kept).then(value)
         };
-        let powers = || {
-            beside_unknowns::by_chance(evidence, |at| {
+        match change {
+            None => beside_unknowns::by_chance(evidence, |at| {
                 let one = scales[i].one(value(&at, 1)?);
                 Some(std::array::from_fn::<f64, SHAPE, _>(|power| one.powi(power as i32)))
-            })
-        };
-        let change =
-            |lag: usize| beside_unknowns::by_chance(evidence, |at| Some([value(&at, lag + 1)? - value(&at, lag + 2)?]));
-        match sums[i * outputs + j].most_certain() {
-            0 => powers(),
-            change_before => change(change_before - 1),
+            }),
+            Some(lag) => beside_unknowns::by_chance(evidence, |at| Some([value(&at, lag + 1)? - value(&at, lag + 2)?])),
         }
     };
-    let mut told = suspicious.into_iter().map(|(i, j, part, chance)| (i, j, part, chance.max(beside(i, j) * many)));
-    let (i, j, part, chance) = told.find(|(.., chance)| *chance < color::LIKELY)?;
+    let mut told = suspicious.into_iter().map(|(of, part, chance)| (of, part, chance.max(beside(of) * many)));
+    let ((i, j, _), part, chance) = told.find(|(.., chance)| *chance < color::LIKELY)?;
     let text = format!(
         "the errors of `{}` follow from what the input `{}` was at the samples before ({}): the model lacks a delay, an inertia or a \
          curve, the signals are not of the same moments, or correlated noise is fed back, by {} of what the output moves, and no \
@@ -201,25 +196,16 @@ impl Before {
         }
     }
 
-    /// The root of the part of the squared errors that follows from each, and the probability by chance: from the powers, then from the changes.
-    fn all(&self) -> [(f64, f64); BEFORE] {
+    /// What the errors follow from most certainly, the powers or one of the changes; the root of the part of the squared errors that does, and the probability by
+    /// chance.
+    fn follows(&self) -> (Option<usize>, f64, f64) {
         let squares = self.powers.sum_of_squares();
-        std::array::from_fn(|i| match i.checked_sub(1).map(|lag| &self.changes[lag]) {
-            None => (self.powers.explained_part(), self.powers.by_chance()),
-            Some(change) => (change.explained_part(squares), change.by_chance()),
-        })
-    }
-
-    /// The number of that which they follow from most certainly.
-    fn most_certain(&self) -> usize {
-        let all = self.all();
-        (0..BEFORE).min_by(|a, b| all[*a].1.total_cmp(&all[*b].1)).unwrap_or(0)
-    }
-
-    /// The root of the part of the squared errors that follows most certainly, and the probability by chance.
-    fn follows(&self) -> (f64, f64) {
-        let (part, chance) = self.all()[self.most_certain()];
-        (part, chance * BEFORE as f64)
+        let changes = self.changes.iter().enumerate();
+        let changes = changes.map(|(lag, one)| (Some(lag), one.explained_part(squares), one.by_chance()));
+        let powers = (None, self.powers.explained_part(), self.powers.by_chance());
+        let all = std::iter::once(powers).chain(changes);
+        let (change, part, chance) = all.min_by(|a, b| a.2.total_cmp(&b.2)).unwrap_or(powers);
+        (change, part, chance * BEFORE as f64)
     }
 }
 

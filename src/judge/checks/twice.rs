@@ -30,7 +30,7 @@ pub(crate) const TWICE: Check = Check::new(
 const COMPARED: usize = 300;
 /// The same at equal times, where the digits of numbers are looked at.
 const COMPARED_BY_TIME: usize = 100;
-/// Parts of records that are equal though their outputs change so often from sample to sample.
+/// Parts of records that are equal are named if their first output changes at least so often from sample to sample.
 const CHANGES: usize = 10;
 /// Samples of two records whose times differ by less than this part of the interval are of the same time.
 const SAME_TIME: f64 = 1e-6;
@@ -77,12 +77,13 @@ fn measured(record: &Record, k: usize) -> impl Iterator<Item = f64> + '_ {
     record.outputs().iter().map(move |output| output.values[k])
 }
 
-/// Counts samples at which both records have the same measurements, and how often these change.
+/// Counts samples at which both records have the same measurements, and how often these change from sample to sample in both: noise around a number
+/// is, rounded, that number.
 #[derive(Default)]
 struct Common {
     samples: usize,
     changes: usize,
-    before: Option<f64>,
+    before: Option<(f64, f64)>,
 }
 
 impl Common {
@@ -94,11 +95,12 @@ impl Common {
             if !same(a, b) {
                 return false;
             }
-            any = any.or(Some(a));
+            any = any.or(Some((a, b)));
         }
         if let Some(here) = any {
             self.samples += 1;
-            self.changes += usize::from(self.before.is_some_and(|before| before != here));
+            let both_change = |before: (f64, f64)| before.0 != here.0 && before.1 != here.1;
+            self.changes += usize::from(self.before.is_some_and(both_change));
             self.before = Some(here);
         }
         true
@@ -131,7 +133,7 @@ fn at_the_same_times(a: &Record, b: &Record) -> Option<usize> {
     common.found()
 }
 
-/// Whether two numbers are the same, or one of them is the other rounded to the digits that it has, or to 32 bits.
+/// Whether two numbers are the same, or one of them is the other rounded: to the digits that it is written with, or to 32 bits.
 fn rounds_to(a: f64, b: f64) -> bool {
     // Rounding of a half goes either way.
     let within = |rounded: f64| (a - b).abs() <= 0.5 * (1.0 + SAME_TIME) * last_digit(rounded);
@@ -147,8 +149,8 @@ fn last_digit(value: f64) -> f64 {
     10f64.powi(exponent - behind as i32)
 }
 
-/// Two records of which one begins within the other, and the number of samples that are the same from there on. A record is looked for by its
-/// first change of the first output.
+/// Two records of which one begins within the other, bit by bit, and the number of samples that are the same. The begin of a record is recognized by the first two
+/// samples between which its first output changes.
 fn overlapping(records: &[Record]) -> Option<((usize, usize), usize)> {
     let first = |record: &Record| record.outputs().first().map(|output| output.values.clone());
     let bits = |from: f64, to: f64| (from.to_bits(), to.to_bits());
@@ -218,6 +220,9 @@ mod tests {
         other[39] = 0.5;
         assert_eq!(at_the_same_times(&all, &record(0.0, 0.1, other)), None);
         assert_eq!(at_the_same_times(&all, &record(9.0, 0.1, values(0..40))), None);
+        // Noise around a whole number, and a coarse sensor that shows that number.
+        let steady: Vec<f64> = values(0..40).iter().map(|y| 21.0 + 0.3 * y).collect();
+        assert_eq!(at_the_same_times(&record(0.0, 0.1, steady), &record(0.0, 0.1, vec![21.0; 40])), None);
     }
 
     #[test]

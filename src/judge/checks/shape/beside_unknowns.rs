@@ -1,9 +1,9 @@
 //! A test of errors against regressors beside the unknowns.
 //!
-//! Errors of one size have products with a regressor that are smaller than those of the noise by what the fit took away, so that a test without slopes is
-//! safe. Where errors are larger in one part of the data than in others, they move the unknowns there, and what follows from it elsewhere is large beside the
-//! small errors there. So each regressor is replaced by the part that is orthogonal to the slopes, and the variance of its products is that of the
-//! squares of the errors, each of its own size (a score test, robust as in White, Econometrica 48 (1980) 817).
+//! If all errors are of one size, the fit makes their products with a regressor smaller than those of the noise, and a test without slopes finds too little rather
+//! than too much. If they are larger in one record than in the others, its noise moves the unknowns, and the predictions of the other records with them: by much,
+//! compared with the small errors there. So each regressor is replaced by its part that is orthogonal to the slopes, and the variance of the products is
+//! taken from the square of each error (a score test that allows for errors of any size: White, Econometrica 48 (1980) 817).
 
 use crate::judge::evidence::Evidence;
 use crate::problem::{Accumulate, Whitening};
@@ -15,19 +15,20 @@ use nalgebra::{DMatrix, DVector};
 /// With more unknowns their inverse curvature is not written out.
 const MOST: usize = 300;
 
-/// An error in its own unit, and where it stands.
-pub(super) struct Error {
+/// A measurement and its error, in the unit of the output.
+pub(super) struct Measured {
     pub experiment: usize,
     pub sample: usize,
     pub output: usize,
     pub error: f64,
 }
 
-/// The probability that errors follow as much by chance from regressors, those of each measurement (`None`: it is left out, as of regressors of zero). Zero where
-/// slopes say nothing of it: with weights, a loss, a pre-filter or predicted variances, correlated outputs or too many unknowns.
+/// The probability that the errors follow as much from the regressors by chance. `regressors` gives those of a measurement, `None` where all are zero. The
+/// probability is zero, so that the test without slopes decides, with weights, a loss, a pre-filter, predicted variances, a full noise covariance, or more
+/// than 300 unknowns.
 pub(super) fn by_chance<const N: usize>(
     evidence: &Evidence<'_>,
-    regressors: impl Fn(Error) -> Option<[f64; N]> + Sync,
+    regressors: impl Fn(Measured) -> Option<[f64; N]> + Sync,
 ) -> f64 {
     let objective = evidence.point.objective;
     let all = objective.problem.unknowns.row.len();
@@ -83,7 +84,7 @@ struct Products<'p, const N: usize, F> {
     row: DVector<f64>,
 }
 
-impl<const N: usize, F: Fn(Error) -> Option<[f64; N]> + Sync> Accumulate for Products<'_, N, F> {
+impl<const N: usize, F: Fn(Measured) -> Option<[f64; N]> + Sync> Accumulate for Products<'_, N, F> {
     fn add(&mut self, window: &Window, lane: usize) {
         let columns = self.cross.nrows();
         for (k, j) in (0..window.samples[lane]).flat_map(|k| (0..window.outputs()).map(move |j| (k, j))) {
@@ -92,8 +93,8 @@ impl<const N: usize, F: Fn(Error) -> Option<[f64; N]> + Sync> Accumulate for Pro
             }
             let (standardized, sample) = (window.error(k, j, lane), window.begin[lane] + k);
             let error = standardized * self.sigma[j];
-            let z =
-                (self.regressors)(Error { experiment: self.experiment, sample, output: j, error }).unwrap_or([0.0; N]);
+            let z = (self.regressors)(Measured { experiment: self.experiment, sample, output: j, error })
+                .unwrap_or([0.0; N]);
             (0..columns).for_each(|c| self.row[c] = window.at(k, j, c, lane));
             z.iter().enumerate().for_each(|(i, z)| self.row[columns + i] = *z);
             for (i, z) in z.iter().enumerate().filter(|(_, z)| **z != 0.0) {
