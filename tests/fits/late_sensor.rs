@@ -1,7 +1,7 @@
 #![cfg(feature = "std")]
 //! Records whose sensor begins to measure when the initial state has died out.
 
-use crate::common::{Noise, levels};
+use crate::common::{self, Branch, Current, Noise, Voltage, levels, noisy, simulated};
 use greybox::*;
 
 signals! { pub struct Level { x: "1" } }
@@ -49,6 +49,26 @@ fn an_initial_state_that_has_died_out_does_not_keep_a_fit_from_its_end() {
         let said =
             |warning: &Warning| warning.code == WarningCode::Unidentified && warning.text.contains("has died out");
         assert!(fit.warnings.iter().any(said), "{late}: {fit}");
+    }
+}
+
+/// Of a linear plant between 14 and 20 time constants, where a search would still change the initial state by many times its size.
+#[test]
+fn an_initial_state_that_has_nearly_died_out_is_held() {
+    for seed in 0..40 {
+        let mut noise = Noise(seed);
+        let late = 112 + 12 * (seed as usize % 5);
+        let inputs = levels(500, 20, seed).into_iter().map(|u| Voltage { u }).collect();
+        let run = simulated(&common::Lag, 0.1, inputs, Current { i: 0.3 }, Branch { gain: 1.5, tau: 0.8 });
+        let record = noisy(&common::Lag, &run, Current { i: 0.02 }, &mut noise);
+        let hidden = |(k, y): (usize, Current)| if k < late { Current { i: f64::NAN } } else { y };
+        let outputs = record.outputs().enumerate().map(hidden).collect();
+        let record =
+            Experiment::new(&common::Lag, record.times().clone(), record.inputs().collect(), outputs).unwrap();
+        let start = Branch { gain: free(1.0), tau: free(0.5) };
+        let fit = Fit::new(&common::Lag, &record).parameters(start).run().unwrap();
+        assert!(fit.severity() < Severity::NotUsable, "{seed} {late}: {fit}");
+        assert_eq!(fit.unknowns[2].knowledge, Knowledge::Unidentified, "{seed} {late}: {fit}");
     }
 }
 
