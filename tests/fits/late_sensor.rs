@@ -63,8 +63,7 @@ fn an_initial_state_that_has_nearly_died_out_is_held() {
         let record = noisy(&common::Lag, &run, Current { i: 0.02 }, &mut noise);
         let hidden = |(k, y): (usize, Current)| if k < late { Current { i: f64::NAN } } else { y };
         let outputs = record.outputs().enumerate().map(hidden).collect();
-        let record =
-            Experiment::new(&common::Lag, record.times().clone(), record.inputs().collect(), outputs).unwrap();
+        let record = Experiment::new(&common::Lag, record.times().clone(), record.inputs().collect(), outputs).unwrap();
         let start = Branch { gain: free(1.0), tau: free(0.5) };
         let fit = Fit::new(&common::Lag, &record).parameters(start).run().unwrap();
         assert!(fit.severity() < Severity::NotUsable, "{seed} {late}: {fit}");
