@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import operator
 import os
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
 
 from greybox.errors import Error
 
-__all__ = ["column_name", "flag", "mapping", "number", "path", "shown", "text", "whole"]
+__all__ = ["column_name", "flag", "mapping", "names", "number", "path", "shown", "text", "whole"]
 
 
 def shown(value: Any) -> str:
@@ -96,6 +96,20 @@ def column_name(what: str, value: Any) -> str:
     if not isinstance(value, (str, int, np.integer)) or isinstance(value, bool):
         raise Error(f"{what} is {shown(value)}; give the name of a column")
     return str(value)
+
+
+def names(what: str, value: Any) -> list[str]:
+    """Give names as a list; one text is none.
+
+    Raises
+    ------
+    Error
+        If what is given is no collection of names.
+    """
+    given = None if isinstance(value, (str, bytes)) or not isinstance(value, Iterable) else list(value)
+    if given is None or not all(isinstance(name, str) for name in given):
+        raise Error(f"{what} is {shown(value)}; give names in a list")
+    return given
 
 
 def path(what: str, value: Any) -> str:

@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 
 from greybox.align import Method, align
+from greybox.checks import names as names_of
+from greybox.checks import path as path_of
 from greybox.errors import Error
 from greybox.signals import near
 
@@ -60,8 +62,8 @@ def read(
     Error
         If the file cannot be read, has no such signal, or the package that reads it is not installed.
     """
-    path = Path(path)
-    names = None if signals is None else list(signals)
+    path = Path(path_of("path", path))
+    names = None if signals is None else names_of("signals", signals)
     reader = _READERS.get(path.suffix.lower())
     if path.suffix.lower() in TEXT:
         raise Error(f"{path}: hand the path over in place of a frame, gb.fit(model, {str(path)!r}, ...); or read it by pandas.read_csv")

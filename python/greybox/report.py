@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 
 from greybox import _core
+from greybox.checks import path as path_of
 
 __all__ = ["Report"]
 
@@ -28,7 +29,7 @@ class Report:
         Error
             If the path has another ending, or cannot be written to.
         """
-        self._made.save(path)
+        self._made.save(path_of("path", path))
 
     def to_html(self) -> str:
         """Give one self-contained page."""

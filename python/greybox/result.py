@@ -12,7 +12,8 @@ import numpy as np
 
 from greybox import _core
 from greybox.bootstrap import Bootstrap
-from greybox.checks import number, text, whole
+from greybox.checks import names as names_of
+from greybox.checks import number, shown, text, whole
 from greybox.errors import Error, FitWarning, RecordWarning, warn
 from greybox.estimate import Estimate
 from greybox.frames import Array, Kind, joined
@@ -291,9 +292,11 @@ class Fit(Estimate):
         Error
             If the path has another ending, or cannot be written to.
         """
-        made = self._problem.report(self._estimate)
+        if bootstrap is not None and not isinstance(bootstrap, Bootstrap):
+            raise Error(f"bootstrap is {shown(bootstrap)}; give what fit.bootstrap() returns")
         drawn = None if bootstrap is None else bootstrap.to_json()
-        report = Report(made.extended(text("title", title), [self.profile(name).to_json() for name in profiles], drawn))
+        profiled = [self.profile(name).to_json() for name in names_of("profiles", profiles)]
+        report = Report(self._problem.report(self._estimate).extended(text("title", title), profiled, drawn))
         if path is not None:
             report.save(path)
         return report

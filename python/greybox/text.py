@@ -8,6 +8,7 @@ from typing import Any
 from greybox import _core
 from greybox._core import Parameter
 from greybox.checks import number
+from greybox.checks import path as path_of
 from greybox.errors import ModelWarning, warn
 from greybox.model import Equations
 from greybox.signals import named
@@ -77,7 +78,7 @@ def load(path: str | os.PathLike[str], **constants: float) -> TextModel:
     ModelWarning
         Of units that do not fit, and of quantities that are not used.
     """
-    file = _core.TextModel.read(path, [(name, number(f"constant `{name}`", value)) for name, value in constants.items()])
+    file = _core.TextModel.read(path_of("path", path), [(name, number(f"constant `{name}`", value)) for name, value in constants.items()])
     for remark in file.warnings:
         warn(ModelWarning(remark))
     return TextModel(file)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -102,6 +103,18 @@ def test_reports(fitted: gb.Fit, tmp_path: Path) -> None:
         fitted.report(tmp_path / "r.pdf")
     with pytest.raises(gb.Error, match="No such file"):
         fitted.report(tmp_path / "nowhere" / "r.html")
+    wrong: list[tuple[dict[str, Any], str]] = [
+        ({"profiles": "rs"}, "profiles is 'rs'; give names in a list"),
+        ({"profiles": 3}, "profiles is 3; give names in a list"),
+        ({"bootstrap": 0.9}, r"bootstrap is 0\.9; give what fit\.bootstrap\(\) returns"),
+        ({"path": 7}, "path is 7; give the path of a file"),
+    ]
+    for given, said in wrong:
+        with pytest.raises(gb.Error, match=said):
+            fitted.report(**given)
+    for ask in (report.save, gb.read, gb.load):
+        with pytest.raises(gb.Error, match="path is 7; give the path of a file"):
+            ask(7)  # type: ignore[operator]
     assert sorted(one.name for one in tmp_path.iterdir()) == ["r.html", "r.json", "r.md", "r.txt"]
 
 

@@ -16,6 +16,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 /// Least number of samples, number of segments.
 const SEGMENTS: [(usize, usize); 6] =
     [(512, 8), (4_096, 16), (16_384, 32), (131_072, 64), (1_048_576, 128), (8_388_608, 256)];
+/// The same of records without a state, whose samples are rows of a table: nothing is carried between segments, so that short ones cost nothing.
+const OF_ROWS: (usize, usize) = (16, 8);
 /// From this number of records on, uncut records fill the lanes.
 const MANY: usize = 8;
 /// Longest carry for which cutting saves time: a segment has a slope for each of its entries.
@@ -37,7 +39,8 @@ impl Cuts {
         let coupling = sweep.coupling();
         let carried = matches!(coupling, Coupling::Affine | Coupling::Nonlinear);
         let whole = ordered || records.len() >= MANY || coupling == Coupling::Uncut || carried && sweep.carry() > CARRY;
-        let segments = records.iter().map(|record| cut(record.len(), whole)).collect();
+        let shortest = (coupling == Coupling::Restarted && sweep.restarts().is_none()).then_some(OF_ROWS);
+        let segments = records.iter().map(|record| cut(record.len(), whole, shortest)).collect();
         Cuts { segments, carried, affine: coupling == Coupling::Affine }
     }
 
@@ -47,8 +50,10 @@ impl Cuts {
     }
 }
 
-fn cut(samples: usize, whole: bool) -> Vec<Range<usize>> {
-    let segments = SEGMENTS.iter().rev().find(|(least, _)| samples >= *least).map_or(1, |(_, segments)| *segments);
+/// `shortest` comes before the other lengths from which a record is cut.
+fn cut(samples: usize, whole: bool, shortest: Option<(usize, usize)>) -> Vec<Range<usize>> {
+    let mut lengths = SEGMENTS.iter().rev().chain(&shortest);
+    let segments = lengths.find(|(least, _)| samples >= *least).map_or(1, |(_, segments)| *segments);
     if whole || segments == 1 {
         return std::iter::once(0..samples).collect();
     }
@@ -178,5 +183,25 @@ impl Memory {
 impl Clone for Memory {
     fn clone(&self) -> Self {
         Memory(Mutex::new(self.points().clone()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A segment begins where the one before ends, whatever the length is divided by; short records of rows are cut, others are not.
+    #[test]
+    fn segments_are_the_record() {
+        for samples in (1..700).chain([4_095, 4_096, 20_001]) {
+            for (shortest, least) in [(None, 512), (Some(OF_ROWS), 16)] {
+                let found = cut(samples, false, shortest);
+                let joined = found.windows(2).all(|pair| pair[0].end == pair[1].start);
+                let whole = found[0].start == 0 && found.last().is_some_and(|last| last.end == samples);
+                assert!(joined && whole && found.iter().all(|one| !one.is_empty()), "{samples}: {found:?}");
+                assert_eq!(found.len() > 1, samples >= least, "{samples}");
+                assert_eq!(cut(samples, true, shortest).len(), 1);
+            }
+        }
     }
 }
