@@ -8,6 +8,7 @@ use super::job::Job;
 use super::segments::Borders;
 use super::{Free, Noise, Objective, Role, Values, Weighing, Whitening};
 use crate::information::{Chain, Information};
+use crate::layout::Kind;
 use crate::optimize::{Infeasible, Linearization};
 use crate::parameter::Transform;
 use crate::sweep::{Piece, Reached, RunError, Seed};
@@ -215,18 +216,23 @@ impl Objective<'_> {
         let by_output = vec![[0.0; 2]; if sets > 1 { sets } else { 0 }];
         let mut found = Triangulation { cost: 0.0, moved: 0.0, by_output, blocks: vec![], borders: None };
         let mut of = Vec::with_capacity(chained.len());
+        let is_static = self.problem.layout().kind == Kind::Static;
         for (e, (chained, segments)) in chained.into_iter().zip(&cuts.segments).enumerate() {
             let mut parts = parts.by_ref().take(segments.len());
             if let Some(chained) = chained {
                 of.push(found.chain(chained, (segments.len(), sets), parts, guess, corrects));
                 continue;
             }
-            let Some(Part { cost, triangle: mut whole, .. }) = parts.next() else { continue };
-            found.cost += cost;
+            let Some(Part { mut cost, triangle: mut whole, .. }) = parts.next() else { continue };
             for part in parts {
-                found.cost += part.cost;
+                cost += part.cost;
                 whole.iter_mut().zip(&part.triangle).for_each(|(whole, part)| whole.merge(part));
             }
+            // A record of rows in one piece keeps more of numbers whose squares are out of range.
+            if segments.len() > 1 && is_static && is_out_of_range(cost, &whole) {
+                (cost, whole) = self.in_one_piece(e, &values[e], coordinates, sets)?;
+            }
+            found.cost += cost;
             let scales = self.problem.unknowns.scales(e, coordinates);
             whole.iter_mut().for_each(|triangle| triangle.scale_columns(&scales));
             for ([_, squares], triangle) in found.by_output.iter_mut().zip(&whole) {
@@ -245,6 +251,20 @@ impl Objective<'_> {
         Ok(found)
     }
 
+    /// Cost and triangles of an experiment that is not cut, with slopes in the quantities themselves.
+    fn in_one_piece(
+        &self,
+        e: usize,
+        values: &Values,
+        coordinates: &[f64],
+        sets: usize,
+    ) -> Result<(f64, Vec<Information>), Infeasible> {
+        let job = in_quantities(self.job(e, values, coordinates, true));
+        let parts = parts_by_output(&[&job], sets).map_err(|Broken { error, .. }| self.infeasible(e, error))?;
+        let part = parts.into_iter().next().map(|part| (part.cost, part.triangle));
+        part.ok_or_else(|| self.infeasible(e, RunError::Failed { sample: 0 }))
+    }
+
     /// The segments of an experiment between which nothing is carried, with slopes in the quantities themselves.
     fn independent_jobs<'p>(
         &'p self,
@@ -253,12 +273,7 @@ impl Objective<'_> {
         coordinates: &[f64],
         guess: Option<&'p Borders>,
     ) -> Vec<Job<'p>> {
-        let mut jobs = self.segments(e, values, coordinates, true, guess);
-        for job in &mut jobs {
-            // A scale of zero marks a column that is left out; it stays zero.
-            job.scales.iter_mut().filter(|scale| **scale != 0.0).for_each(|scale| *scale = 1.0);
-        }
-        jobs
+        self.segments(e, values, coordinates, true, guess).into_iter().map(in_quantities).collect()
     }
 
     /// The cost of one experiment alone, priors left out.
@@ -292,6 +307,18 @@ pub(super) fn parts_by_output(jobs: &[&Job<'_>], sets: usize) -> Result<Vec<Part
         Part { cost, triangle, reached }
     };
     Ok(reached.into_iter().enumerate().map(part).collect())
+}
+
+/// A scale of zero marks a column that is left out; it stays zero.
+fn in_quantities(mut job: Job<'_>) -> Job<'_> {
+    job.scales.iter_mut().filter(|scale| **scale != 0.0).for_each(|scale| *scale = 1.0);
+    job
+}
+
+/// Whether cost or triangles of segments have overflown, or have columns of zeros that may have been too small for a segment.
+fn is_out_of_range(cost: f64, triangles: &[Information]) -> bool {
+    let is_zero = |triangle: &Information| (0..triangle.columns()).any(|i| triangle.at(i, i) == 0.0);
+    !cost.is_finite() || triangles.iter().any(|triangle| !triangle.is_finite() || is_zero(triangle))
 }
 
 impl Job<'_> {

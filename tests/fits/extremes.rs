@@ -62,7 +62,7 @@ fn records_of_any_size() {
                 assert_finite(&what, &estimate);
                 let text = estimate.to_json().unwrap();
                 assert_eq!(Summary::from_json(&text).unwrap().to_json().unwrap(), text, "{what}");
-                let report = Report::new(&problem, &estimate).unwrap();
+                let report = Report::new(&problem, &estimate).unwrap_or_else(|error| panic!("{what}: {error}"));
                 assert!(!report.to_html().contains("\"NaN"), "{what}");
                 answers += 1;
             }
