@@ -315,10 +315,11 @@ fn in_quantities(mut job: Job<'_>) -> Job<'_> {
     job
 }
 
-/// Whether cost or triangles of segments have overflown, or have columns of zeros that may have been too small for a segment.
+/// Whether cost or triangles have overflown, or a column is zero in all of them, which may have been too small for segments.
 fn is_out_of_range(cost: f64, triangles: &[Information]) -> bool {
-    let is_zero = |triangle: &Information| (0..triangle.columns()).any(|i| triangle.at(i, i) == 0.0);
-    !cost.is_finite() || triangles.iter().any(|triangle| !triangle.is_finite() || is_zero(triangle))
+    let columns = triangles.first().map_or(0, Information::columns);
+    let is_zero = |i: usize| triangles.iter().all(|triangle| triangle.at(i, i) == 0.0);
+    !cost.is_finite() || !triangles.iter().all(Information::is_finite) || (0..columns).any(is_zero)
 }
 
 impl Job<'_> {
