@@ -228,7 +228,7 @@ impl Objective<'_> {
                 cost += part.cost;
                 whole.iter_mut().zip(&part.triangle).for_each(|(whole, part)| whole.merge(part));
             }
-            // A record of rows in one piece keeps more of numbers whose squares are out of range.
+            // Segments are short: where squares over- or underflow in their triangles, the whole record may still have one.
             if segments.len() > 1 && is_static && is_out_of_range(cost, &whole) {
                 (cost, whole) = self.in_one_piece(e, &values[e], coordinates, sets)?;
             }
@@ -309,13 +309,13 @@ pub(super) fn parts_by_output(jobs: &[&Job<'_>], sets: usize) -> Result<Vec<Part
     Ok(reached.into_iter().enumerate().map(part).collect())
 }
 
-/// A scale of zero marks a column that is left out; it stays zero.
+/// The job with slopes with respect to quantities instead of coordinates. A scale of zero marks a column that is left out; it stays zero.
 fn in_quantities(mut job: Job<'_>) -> Job<'_> {
     job.scales.iter_mut().filter(|scale| **scale != 0.0).for_each(|scale| *scale = 1.0);
     job
 }
 
-/// Whether cost or triangles have overflown, or a column is zero in all of them, which may have been too small for segments.
+/// Whether the cost or a triangle is not finite, or a column is zero in the triangles of all outputs: its squares may have underflown.
 fn is_out_of_range(cost: f64, triangles: &[Information]) -> bool {
     let columns = triangles.first().map_or(0, Information::columns);
     let is_zero = |i: usize| triangles.iter().all(|triangle| triangle.at(i, i) == 0.0);

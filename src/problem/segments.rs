@@ -16,7 +16,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 /// Least number of samples, number of segments.
 const SEGMENTS: [(usize, usize); 6] =
     [(512, 8), (4_096, 16), (16_384, 32), (131_072, 64), (1_048_576, 128), (8_388_608, 256)];
-/// The same of records without a state, whose samples are rows of a table: nothing is carried between segments, so that short ones cost nothing.
+/// The same for static models: nothing is carried from segment to segment, so that short records, too, are evaluated in parallel lanes.
 const OF_ROWS: (usize, usize) = (16, 8);
 /// From this number of records on, uncut records fill the lanes.
 const MANY: usize = 8;
@@ -50,7 +50,7 @@ impl Cuts {
     }
 }
 
-/// `shortest` comes before the other lengths from which a record is cut.
+/// The segments of a record of so many samples; `shortest` is a further least length with its number of segments, below those of [`SEGMENTS`].
 fn cut(samples: usize, whole: bool, shortest: Option<(usize, usize)>) -> Vec<Range<usize>> {
     let mut lengths = SEGMENTS.iter().rev().chain(&shortest);
     let segments = lengths.find(|(least, _)| samples >= *least).map_or(1, |(_, segments)| *segments);

@@ -71,14 +71,15 @@ fn coverage(samples: usize, rho: f64, repetitions: u64) -> ([f64; 3], f64) {
     (covered, allowed)
 }
 
-/// 93 to 97 % (1,000 repetitions) at 5,000 samples and at 500, worth some 170 and 25 independent ones, whatever the correlation; 97.1 % were
-/// measured of one parameter at 500 samples with 0.9. The test takes 300: 91 to 99 % are three binomial deviations. Classical intervals cover a third to a half of the time (see `intervals`).
+/// 93 to 97 % (1,000 repetitions: binomial spread 0.7 %) at 5,000 samples and at 500, worth some 170 and 25 independent ones,
+/// whatever the correlation; 97.1 % were measured of one parameter at 500 samples with 0.9. Classical intervals cover a third to a half of the time (see `intervals`).
 #[test]
 fn another_design_is_covered_too() {
     for (samples, rho) in [(5000, 0.5), (5000, 0.9), (500, 0.5), (500, 0.9)] {
-        let (covered, allowed) = coverage(samples, rho, 300);
+        let (covered, allowed) = coverage(samples, rho, 1000);
         println!("oscillator, AR(1) {rho}, {samples} samples: {covered:?}, allowed for in {allowed}");
-        assert!(covered.iter().all(|part| (0.91..=0.99).contains(part)), "{samples} {rho}: {covered:?}");
+        let most = if (samples, rho) == (500, 0.9) { 0.98 } else { 0.97 };
+        assert!(covered.iter().all(|part| (0.93..=most).contains(part)), "{samples} {rho}: {covered:?}");
         assert!(allowed > 0.99, "{samples} {rho}: {allowed}");
     }
 }

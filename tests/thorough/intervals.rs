@@ -127,12 +127,12 @@ fn bootstraps_agree_with_sandwiches() {
     }
 }
 
-/// Percentiles of refits cover 95 % of the time: 200 records of 300 samples, 200 refits each. Three binomial deviations are 4.6 %.
+/// Percentiles of refits cover 93 to 97 % of the time: 400 records of 300 samples, 200 refits each; binomial spread 1.1 %.
 #[test]
 fn bootstrap_covers() {
     let truth = [TRUTH.gain, TRUTH.tau];
     let mut covered = [0.0; 2];
-    for seed in 0..200 {
+    for seed in 0..400 {
         let record = record(300, 0.0, seed);
         let fit = Fit::new(&Lag, &record).parameters(Branch { gain: free(1.5), tau: free(0.1).log() });
         let problem = fit.problem().unwrap();
@@ -140,11 +140,11 @@ fn bootstrap_covers() {
         let found = bootstrap(&problem, &estimate, Resampling::Residuals, 200, seed).unwrap();
         for (j, covered) in covered.iter_mut().enumerate() {
             let (lower, upper) = found.intervals[j];
-            *covered += f64::from(u8::from(lower <= truth[j] && truth[j] <= upper)) / 200.0;
+            *covered += f64::from(u8::from(lower <= truth[j] && truth[j] <= upper)) / 400.0;
         }
     }
     println!("bootstrap: {covered:?}");
-    assert!(covered.iter().all(|covered| (0.9..=0.995).contains(covered)), "{covered:?}");
+    assert!(covered.iter().all(|covered| (0.93..=0.97).contains(covered)), "{covered:?}");
 }
 
 /// Bands hold the noise-free output, and new measurements, as often as they say; 400 records, at one sample each.
