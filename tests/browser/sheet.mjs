@@ -28,7 +28,7 @@ for (const width of [375, 1440]) {
   for (const id of found.empty) troubles.push(`${width} px: the figure ${id} has no picture or no caption`);
   if (found.wide > width) troubles.push(`is ${found.wide} px wide at ${width} px`);
   await page.evaluate(axe);
-  const { violations } = await page.evaluate(() => window.axe.run());
+  const violations = await page.evaluate(async () => (await window.axe.run({ resultTypes: ["violations"] })).violations);
   for (const { id, nodes } of violations) troubles.push(`${width} px: ${id}: ${nodes.slice(0, 5).map((node) => node.target).join(", ")}`);
 }
 await browser.close();
