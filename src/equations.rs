@@ -218,6 +218,11 @@ impl Equations {
         }
     }
 
+    /// Whether they say the noise of an output ([`Model::noise`]).
+    pub(crate) fn says_noise(&self, output: usize) -> bool {
+        self.roots.noise.get(output).is_some_and(|id| !self.graph.known(*id).is_some_and(f64::is_nan))
+    }
+
     /// Whether derivatives, outputs and jumps are affine in the states: then so is each step, and slopes do not depend on states.
     pub fn is_affine(&self) -> bool {
         let degrees = degrees(&self.graph, &|leaf| matches!(leaf, Leaf::State(_)));

@@ -10,6 +10,7 @@ mod kink;
 mod lockstep;
 mod moves;
 mod nearby;
+mod noisy;
 mod pieces;
 mod predict;
 #[cfg(feature = "parallel")]

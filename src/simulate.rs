@@ -13,8 +13,9 @@ use crate::numeral::TimeUnit;
 use crate::random::Random;
 use crate::record::{Channel, NO_DEAD_TIME, Part, Record, Time, is_dead_time};
 use crate::signals::{Of, Signals};
+pub(crate) use disturbed::Disturbance;
+
 use coarse::Coarse;
-use disturbed::Disturbance;
 
 /// Simulates a model from an initial state, its inputs held from sample to sample, by the step that its kind asks for;
 /// [`Simulator`] has the choice.

@@ -6,7 +6,6 @@ use crate::terminal::Terminal;
 use crate::{Failure, Verdict, convert, output, records};
 use greybox::graph::Id;
 use greybox::layout::{Layout, Quantity};
-use greybox::record::Record;
 use greybox::text::Model;
 use greybox::{Fleet, fixed};
 use std::path::PathBuf;
@@ -75,40 +74,61 @@ pub fn run(one: &Simulate, terminal: &Terminal) -> Result<Verdict, Failure> {
         };
         terminal.remark(format_args!("{origin} at {}; --initial gives another state", states.join(", ")));
     }
-    if let Some(text) = left_out(&model, &one.noise) {
-        terminal.remark(text);
-    }
-    let simulated = fit.simulate(&initial, &inputs)?;
-    let noise = numbers("--noise", &one.noise)?;
-    let simulated = if noise.is_empty() { simulated } else { noisy(&simulated, layout, &noise, one.seed)? };
+    let noise = noise(layout, &numbers("--noise", &one.noise)?)?;
+    let simulated = if one.noisy {
+        if !has_noise(&model, &noise) {
+            terminal.remark("--noisy: the model has no noise; it says `noise` of outputs and `diffusion` of states");
+        }
+        fit.simulate_noisy(&initial, &inputs, &noise, one.seed)?
+    } else {
+        if let Some(text) = left_out(&model, &noise) {
+            terminal.remark(text);
+        }
+        let simulated = fit.simulate(&initial, &inputs)?;
+        let sigma: Vec<f64> = noise.iter().map(|sigma| sigma.unwrap_or(0.0)).collect();
+        simulated.with_noise(&sigma, one.seed)
+    };
     convert::write(&simulated, one.out.as_deref())?;
     Ok(Verdict::Usable)
 }
 
-/// Says which noise of the model a simulation is without.
-fn left_out(model: &Model, said: &[(String, String)]) -> Option<String> {
-    let (layout, roots) = (model.equations().layout(), model.equations().roots());
+/// The names of the quantities of a model of which it says a level of noise.
+fn with_levels(model: &Model, quantities: &[Quantity], roots: &[Id]) -> Vec<String> {
     let has_level = |root: Id| {
         let (level, roots) = model.equations().graph().pruned(&[root]);
         // What is not declared is a number, zero or none.
         level.len() > 1 || level.evaluate::<f64>(&roots, |_| 1.0).iter().any(|value| *value > 0.0)
     };
-    let names = |quantities: &[Quantity], roots: &[Id]| -> Vec<String> {
-        let with = quantities.iter().zip(roots).filter(|(_, root)| has_level(**root));
-        with.map(|(quantity, _)| quantity.name.clone()).collect()
-    };
-    let mut outputs = names(&layout.outputs, &roots.noise);
-    outputs.retain(|output| said.iter().all(|(name, _)| name != output));
-    let remedy = if outputs.is_empty() { "" } else { "; --noise OUTPUT=STD adds white noise to an output" };
-    let parts = [("noise", outputs), ("diffusion", names(&layout.states, &roots.diffusion))];
-    let parts = parts.into_iter().filter(|(_, names)| !names.is_empty());
-    let parts: Vec<String> = parts.map(|(what, names)| format!("`{what}` of {}", names.join(", "))).collect();
-    (!parts.is_empty()).then(|| format!("simulated without {} of the model{remedy}", parts.join(" and ")))
+    let with = quantities.iter().zip(roots).filter(|(_, root)| has_level(**root));
+    with.map(|(quantity, _)| quantity.name.clone()).collect()
 }
 
-fn noisy(record: &Record, layout: &Layout, noise: &[(String, f64)], seed: u64) -> Result<Record, Failure> {
-    let mut sigma = vec![0.0; layout.outputs.len()];
-    for (name, value) in noise {
+/// Outputs and states whose noise the model says, but outputs of which the command line says another.
+fn of_model(model: &Model, said: &[Option<f64>]) -> [Vec<String>; 2] {
+    let (layout, roots) = (model.equations().layout(), model.equations().roots());
+    let mut outputs = with_levels(model, &layout.outputs, &roots.noise);
+    let is_said = |name: &String| layout.outputs.iter().zip(said).any(|(of, said)| of.name == *name && said.is_some());
+    outputs.retain(|output| !is_said(output));
+    [outputs, with_levels(model, &layout.states, &roots.diffusion)]
+}
+
+fn has_noise(model: &Model, said: &[Option<f64>]) -> bool {
+    of_model(model, said).iter().any(|names| !names.is_empty()) || said.iter().any(Option::is_some)
+}
+
+/// Says which noise of the model a simulation is without.
+fn left_out(model: &Model, said: &[Option<f64>]) -> Option<String> {
+    let [outputs, states] = of_model(model, said);
+    let parts = [("noise", outputs), ("diffusion", states)].into_iter().filter(|(_, names)| !names.is_empty());
+    let parts: Vec<String> = parts.map(|(what, names)| format!("`{what}` of {}", names.join(", "))).collect();
+    (!parts.is_empty())
+        .then(|| format!("simulated without {} of the model; --noisy simulates with it", parts.join(" and ")))
+}
+
+/// The standard deviation of each output that the command line gives.
+fn noise(layout: &Layout, given: &[(String, f64)]) -> Result<Vec<Option<f64>>, Failure> {
+    let mut sigma = vec![None; layout.outputs.len()];
+    for (name, value) in given {
         let at = layout.outputs.iter().position(|output| output.name == *name);
         let available = || layout.outputs.iter().map(|output| output.name.clone()).collect();
         let unknown = || greybox::Error::Unknown { what: "output".into(), name: name.clone(), available: available() };
@@ -119,7 +139,7 @@ fn noisy(record: &Record, layout: &Layout, noise: &[(String, f64)], seed: u64) -
             )
             .into());
         }
-        sigma[at] = *value;
+        sigma[at] = Some(*value);
     }
-    Ok(record.with_noise(&sigma, seed))
+    Ok(sigma)
 }

@@ -66,6 +66,8 @@ class Equations:
         initial: list[float | None],
         inputs: Record,
         integrator: str | None,
+        noise: list[float | None],
+        noisy: int | None,
     ) -> Record: ...
 
 def surface(pole_pairs: int) -> Equations: ...

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from greybox import _core
-from greybox.checks import text, whole
+from greybox.checks import flag, text, whole
 from greybox.errors import Error, warn
 from greybox.frames import joined
 from greybox.model import Model, checked
@@ -177,6 +177,7 @@ def simulate(
     parameters: Mapping[str, float],
     initial: Mapping[str, float] | None = None,
     noise: Mapping[str, float] | None = None,
+    noisy: bool = False,
     seed: int = 1,
     time: str | None = None,
     sample_time: float | None = None,
@@ -184,10 +185,7 @@ def simulate(
     hold: Hold | None = None,
     integrator: str | None = None,
 ) -> Any:
-    """Simulate a model without noise, but for that of `noise`.
-
-    What the model says of noise (``diffusion``, ``noise``, and the levels of a model file) is for estimates: no process noise is simulated, and
-    no noise of outputs is taken from there.
+    """Simulate a model, without noise unless `noisy` or `noise` asks for it.
 
     Parameters
     ----------
@@ -200,9 +198,14 @@ def simulate(
     initial : mapping from str to float, optional
         The state at the first sample. One that is left out is as the model says it (``initial``), or zero.
     noise : mapping from str to float, optional
-        The standard deviation of white noise that is added to each output; without it, and of outputs that are left out, there is none.
+        The standard deviation of white noise that is added to each output; without it, and of outputs that are left out, there is none but that
+        of `noisy`.
+    noisy : bool
+        Simulate with the noise that the model has: process noise disturbs the states (``diffusion``), and white noise is added to the outputs (``noise``) that
+        are not in `noise`. Process noise is drawn at each sample, with the slopes of the model at the sample before: exact of models that are linear in
+        their states, of others to the first order in the time between samples.
     seed : int
-        Of `noise`: the same seed gives the same noise. Without `noise` it has no effect.
+        The same seed gives the same noise; without noise it has no effect.
     time, sample_time, columns, hold
         Of the frame, as in :class:`Record`.
     integrator : str, optional
@@ -230,17 +233,19 @@ def simulate(
     data = framed(data)
     record = Record(data, None, time, sample_time, columns, hold).core(equations, "simulation", outputs=False)
     method = text("integrator", integrator) or equations.defaults().get("integrator")
-    found = equations.core.simulate(list(values.values()), [start.get(name) for name in states], record, method)
-    if noise:
-        found = found.with_noise(sigma, seed)
+    levels = [sigma.get(name) for name in outputs]
+    noisy_seed = seed if flag("noisy", noisy) else None
+    found = equations.core.simulate(list(values.values()), [start.get(name) for name in states], record, method, levels, noisy_seed)
+    if sigma and noisy_seed is None:
+        found = found.with_noise([level or 0.0 for level in levels], seed)
     columns_ = [*zip(inputs, found.inputs(), strict=True), *zip(outputs, found.outputs(), strict=True)]
     return kind_of(data)(joined([("t", found.time()), *columns_]))
 
 
-def _sigma(noise: Mapping[str, float] | None, outputs: Signals) -> list[float]:
-    """Give the level of noise of each output."""
+def _sigma(noise: Mapping[str, float] | None, outputs: Signals) -> dict[str, float]:
+    """Give the levels of noise by output."""
     given = by_name("noise", noise, outputs, "a standard deviation")
     for name, level in given.items():
         if not 0.0 <= level < float("inf"):
             raise Error(f"`{name}` of noise is {level!r}; give a finite standard deviation of zero or more")
-    return [given.get(name, 0.0) for name in outputs]
+    return given

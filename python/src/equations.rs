@@ -91,8 +91,9 @@ impl Equations {
         names(&self.0.layout().parameters)
     }
 
-    /// Simulates with the inputs of a record, and gives it with the outputs; of a state that is not given, from what the record or the model says.
-    #[expect(clippy::needless_pass_by_value, reason = "arguments of Python come as values")]
+    /// Simulates with the inputs of a record, and gives it with the outputs; of a state that is not given, from what the record or the model says. With a
+    /// seed, with the noise that the model has, and that of `noise` in its place.
+    #[expect(clippy::needless_pass_by_value, clippy::too_many_arguments, reason = "arguments of Python come as values")]
     fn simulate(
         &self,
         py: Python<'_>,
@@ -100,6 +101,8 @@ impl Equations {
         initial: Vec<Option<f64>>,
         inputs: &Record,
         integrator: Option<&str>,
+        noise: Vec<Option<f64>>,
+        noisy: Option<u64>,
     ) -> PyResult<Record> {
         let none: [greybox::record::Record; 0] = [];
         let mut fit = Fit::new(&*self.0, &none).parameters(parameters.into_iter().map(fixed).collect());
@@ -109,7 +112,11 @@ impl Equations {
         let simulated = py.detach(|| {
             let said = if initial.contains(&None) { fit.initial_state(&inputs.record)? } else { vec![] };
             let state = |(i, given): (usize, &Option<f64>)| given.unwrap_or_else(|| said[i]);
-            fit.simulate(&initial.iter().enumerate().map(state).collect::<Vec<f64>>(), &inputs.record)
+            let initial: Vec<f64> = initial.iter().enumerate().map(state).collect();
+            match noisy {
+                Some(seed) => fit.simulate_noisy(&initial, &inputs.record, &noise, seed),
+                None => fit.simulate(&initial, &inputs.record),
+            }
         });
         Ok(Record { record: simulated.map_err(raised)?, equations: self.clone() })
     }

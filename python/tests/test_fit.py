@@ -296,7 +296,7 @@ def test_simulate_is_the_record_that_it_makes() -> None:
             gb.simulate(cooling(), u, **said)
 
 
-def test_what_the_model_says_of_noise_is_not_simulated() -> None:
+def test_the_noise_of_the_model_is_simulated_where_it_is_asked_for() -> None:
     u = {"t": np.arange(50) * 0.1, "room": np.full(50, 20.0)}
     parts: dict[str, Any] = {"states": ["body"], "inputs": ["room"], "outputs": ["body"], "parameters": ["k"]}
     noisy = gb.model(
@@ -306,6 +306,17 @@ def test_what_the_model_says_of_noise_is_not_simulated() -> None:
     clean = gb.simulate(cooling(), u, **said)["body"]
     assert (gb.simulate(noisy, u, **said, seed=7)["body"] == clean).all()
     assert (gb.simulate(noisy, u, **said, noise={"body": 0.1})["body"] == gb.simulate(cooling(), u, **said, noise={"body": 0.1})["body"]).all()
+    # Process noise of 5 K per root of a second, then the noise of the output, which is drawn as that of `noise`.
+    moved = gb.simulate(noisy, u, **said, noisy=True, noise={"body": 0.0}, seed=7)["body"]
+    both = gb.simulate(noisy, u, **said, noisy=True, seed=7)["body"]
+    drawn = gb.simulate(cooling(), u, **said, noise={"body": 2.0}, seed=7)["body"]
+    # Rounding of sums of numbers below 128.
+    assert np.abs((both - moved) - (drawn - clean)).max() < 1e-12
+    steps = np.diff(moved - clean * 1.0) + 0.3 * 0.1 * (moved - clean)[:-1]
+    # 5 sqrt(0.1), of 49 numbers within four deviations.
+    assert abs(steps.std() / (5.0 * np.sqrt(0.1)) - 1.0) < 4.0 / np.sqrt(2 * 49)
+    with pytest.raises(gb.Error, match="noisy is 1; take True or False"):
+        gb.simulate(noisy, u, **said, noisy=1)  # type: ignore[arg-type]
 
 
 DECLARED: list[tuple[Callable[[], Any], str]] = [

@@ -162,6 +162,11 @@ impl AnyStepping {
     pub fn is_exact(&self) -> bool {
         self.0.is_exact()
     }
+
+    /// The method of what was chosen, or the default one.
+    pub(super) fn method(chosen: Option<&AnyStepping>) -> Arc<dyn Method> {
+        chosen.map_or_else(|| automatic(1), |stepping| stepping.0.clone())
+    }
 }
 
 /// An integrator of a Rust model: as a trait object, and compiled into the loop over a model's samples. The implicit method that follows the others is a trait
@@ -305,7 +310,7 @@ impl Made for Equations {
     where
         Self: 'a,
     {
-        let method = stepping.map_or_else(|| automatic(1), |stepping| stepping.0.clone());
+        let method = AnyStepping::method(stepping);
         let sweep = of_equations(&model.shared(), &method, &predicting(predictor))?;
         Ok(sweep)
     }

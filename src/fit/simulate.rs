@@ -25,6 +25,16 @@ impl Fit<'_, Equations> {
     /// # Errors
     /// Other inputs or states than the equations have, an initial state that is not finite; a simulation that fails.
     pub fn simulate(&self, initial: &[f64], inputs: &Record) -> Result<Record, Error> {
+        let (outputs, _) = self.simulated(initial, inputs)?;
+        with_outputs(self.model.layout(), inputs, outputs)
+    }
+
+    /// The simulated outputs, and the integrator; `None`: the default one.
+    pub(super) fn simulated(
+        &self,
+        initial: &[f64],
+        inputs: &Record,
+    ) -> Result<(Vec<Vec<f64>>, Option<AnyStepping>), Error> {
         let given = Initial::Given(initial.iter().copied().map(fixed).collect());
         let zeros = vec![vec![0.0; inputs.len()]; self.model.layout().outputs.len()];
         let by = |stepping: Option<&AnyStepping>| {
@@ -32,6 +42,7 @@ impl Fit<'_, Equations> {
             Ok::<_, Error>(problem.in_units(&Control::NEVER).predict(0, &[])?.outputs)
         };
         let (mut outputs, mut before) = (by(self.stepping.as_ref()), f64::INFINITY);
+        let mut taken = self.stepping.clone();
         let chosen = self.stepping.is_some() || self.model.layout().kind != Kind::Continuous;
         let finer = if chosen { vec![] } else { self.model.finer(true) };
         for (_, stepping) in &finer {
@@ -39,7 +50,7 @@ impl Fit<'_, Equations> {
             let change = outputs.as_ref().ok().zip(again.as_ref().ok()).map_or(f64::INFINITY, |(a, b)| change(a, b));
             let is_exact = stepping.is_exact() && again.is_ok();
             if again.is_ok() || outputs.is_err() {
-                outputs = again;
+                (outputs, taken) = (again, Some(stepping.clone()));
             }
             // Of a model with jumps of its derivatives, and of outputs that are rounding, finer steps are no nearer.
             if is_exact || change <= NEAR || change <= ROUGH && change > 0.5 * before {
@@ -47,7 +58,7 @@ impl Fit<'_, Equations> {
             }
             before = change;
         }
-        with_outputs(self.model.layout(), inputs, outputs?)
+        Ok((outputs?, taken))
     }
 
     /// The state at the first sample of a record of inputs, as that declares it ([`Initial`]) or the model says it, with the starts of the parameters;
@@ -110,7 +121,7 @@ fn change(outputs: &[Vec<f64>], again: &[Vec<f64>]) -> f64 {
 }
 
 /// A record of inputs with outputs, its initial state to be estimated.
-fn with_outputs(layout: &Layout, inputs: &Record, outputs: Vec<Vec<f64>>) -> Result<Record, Error> {
+pub(super) fn with_outputs(layout: &Layout, inputs: &Record, outputs: Vec<Vec<f64>>) -> Result<Record, Error> {
     let channel = |(of, values): (&Quantity, Vec<f64>)| Channel::new(&of.name, &of.unit, values);
     let outputs = layout.outputs.iter().zip(outputs).map(channel).collect();
     let record = Record { initial: Initial::Estimated, ..inputs.clone() };

@@ -5,13 +5,13 @@ use crate::layout::Kind;
 use crate::model::Model;
 use crate::random::Random;
 use crate::signals::{Of, Signals};
-use crate::transition::Transition;
+use crate::transition::{Transition, squares};
 
 /// The random numbers of states are others than those that [`with_noise`](super::Simulation::with_noise) adds to outputs.
 const STATES: u64 = 1 << 32;
 
 /// Draws of a model's process noise: the same seed draws the same.
-pub(super) struct Disturbance {
+pub(crate) struct Disturbance {
     of_states: Vec<Random>,
 }
 
@@ -20,8 +20,7 @@ impl Disturbance {
         Disturbance { of_states: (0..states as u64).map(|i| Random::stream(seed, STATES + i)).collect() }
     }
 
-    /// The state at the end of an interval of `h` (s) that begins at another, disturbed by a normal number with the covariance that the
-    /// diffusion at its begin leaves over it.
+    /// The state at the end of an interval of `h` (s) that begins at another, disturbed by what the diffusion at its begin leaves over it.
     pub fn add<M: Model>(
         &mut self,
         system: &ModelSystem<'_, M, f64>,
@@ -30,25 +29,30 @@ impl Disturbance {
         end: &Of<M::State, f64>,
     ) -> Of<M::State, f64> {
         let end = M::State::into_array(*end);
-        let end = end.as_ref();
-        let n = M::State::LEN;
         let (t, u) = (system.interval.t0, system.interval.input(0.0));
         let levels = M::State::into_array(system.model.diffusion(t, begin, &u, system.p));
-        let levels = levels.as_ref();
+        let slopes = (M::KIND == Kind::Continuous).then(|| {
+            let rows = system.jacobian(0.0, &M::State::into_array(*begin)).1;
+            (0..M::State::LEN).flat_map(|i| rows.row(i).to_vec()).collect::<Vec<f64>>()
+        });
+        let added = self.draw(slopes.as_deref(), levels.as_ref(), h);
+        M::State::from_fn(|i| end.as_ref()[i] + added[i])
+    }
+
+    /// Numbers of a normal distribution with the covariance that diffusion of these levels leaves over an interval of `h` (s) of a plant with
+    /// these slopes, row by row; of a discrete plant, which has none, the levels are standard deviations.
+    pub fn draw(&mut self, slopes: Option<&[f64]>, levels: &[f64], h: f64) -> Vec<f64> {
+        let n = levels.len();
         let normal: Vec<f64> = self.of_states.iter_mut().map(Random::normal).collect();
-        if M::KIND != Kind::Continuous {
-            return M::State::from_fn(|i| end[i] + levels[i] * normal[i]);
-        }
-        let rows = system.jacobian(0.0, &M::State::into_array(*begin)).1;
-        let a: Vec<f64> = (0..n).flat_map(|i| rows.row(i).to_vec()).collect();
-        let mut q = vec![0.0; n * n];
-        q.iter_mut().step_by(n + 1).zip(levels).for_each(|(q, level)| *q = level * level);
-        let covariance = Transition::over(n, &a, &q, h).covariance();
+        let Some(slopes) = slopes else {
+            return levels.iter().zip(&normal).map(|(level, normal)| level * normal).collect();
+        };
+        let covariance = Transition::over(n, slopes, &squares(levels), h).covariance();
         if covariance.iter().any(|entry| !entry.is_finite()) {
-            return M::State::from_fn(|_| f64::NAN);
+            return vec![f64::NAN; n];
         }
         let factor = factor(n, covariance);
-        M::State::from_fn(|i| end[i] + (0..=i).map(|j| factor[i * n + j] * normal[j]).sum::<f64>())
+        (0..n).map(|i| (0..=i).map(|j| factor[i * n + j] * normal[j]).sum()).collect()
     }
 }
 

@@ -74,3 +74,49 @@ fn seeds() {
     assert!(correlations.iter().all(|correlation| correlation.abs() < 0.09), "{correlations:?}");
     assert!((sum(&|k| added(k)[0] * added(k)[0]) - 1.0).abs() < 0.13);
 }
+
+/// Equations draw what the Rust model draws from the same seed, by the same steps; without levels in the call, their own noise is added to the
+/// outputs.
+fn equations_draw_the_same<const DISCRETE: bool>() {
+    let model = Heated::<DISCRETE>;
+    let equations = equations::Equations::trace(&model).unwrap();
+    // Intervals of three lengths.
+    let times: Vec<f64> = (0..400).map(|k| 0.1 * f64::from(k) + 0.04 * f64::from(k % 3)).collect();
+    let time = if DISCRETE { Time::Uniform { start: 0.0, step: STEP } } else { Time::Stamps(times) };
+    let inputs: Vec<Heat> = (0..400).map(|k| Heat { u: [1.0, -0.5][k / 20 % 2] }).collect();
+    let from = Walls { a: 0.5, b: -0.3 };
+    let typed = Simulator::new(&model).integrator(Automatic::default()).disturbed(7);
+    let typed = typed.run(&TRUTH, &from, time, &inputs).unwrap();
+    let record = typed.experiment(&model).unwrap().record().clone();
+    let none: [record::Record; 0] = [];
+    let parameters = Building::into_array(TRUTH).map(fixed).to_vec();
+    let fit = Fit::new(&equations, &none).parameters(parameters).integrator(Automatic::default());
+    let simulated = |noise: &[Option<f64>]| fit.simulate_noisy(&[0.5, -0.3], &record, noise, 7).unwrap();
+    let (silent, one, noisy) =
+        (simulated(&[Some(0.0), Some(0.0)]), simulated(&[Some(0.0), None]), simulated(&[None, None]));
+    let mut squares = [0.0; 2];
+    for (k, y) in typed.outputs.iter().enumerate() {
+        let at = |record: &record::Record| [0, 1].map(|j| record.outputs()[j].values[k]);
+        let [found, one, noisy] = [&silent, &one, &noisy].map(at);
+        // Some 400 steps, each with rounding.
+        assert!((found[0] - y.y).abs() < 1e-12 && (found[1] - y.z).abs() < 1e-12, "{k}: {found:?} {y:?}");
+        assert_eq!([one[0], one[1]], [found[0], noisy[1]]);
+        (0..2).for_each(|j| squares[j] += (noisy[j] - found[j]).powi(2) / 400.0);
+    }
+    // Variances of 400 numbers within four deviations, 4 sqrt(2 / 400).
+    let parts = [squares[0] / TRUTH.r.powi(2), squares[1] / (2.0 * TRUTH.r).powi(2)];
+    assert!(parts.iter().all(|part| (part - 1.0).abs() < 0.29), "{parts:?}");
+    let errors = [
+        fit.simulate_noisy(&[0.5, -0.3], &record, &[Some(-1.0), None], 7),
+        fit.simulate_noisy(&[0.5, -0.3], &record, &[], 7),
+    ];
+    let errors = errors.map(|error| error.unwrap_err().to_string());
+    assert_eq!(errors[0], "the noise of output `y` is -1; give zero or a positive number");
+    assert_eq!(errors[1], "0 noise level(s) are given for 2 output(s)");
+}
+
+#[test]
+fn equations_draw_what_a_model_draws() {
+    equations_draw_the_same::<false>();
+    equations_draw_the_same::<true>();
+}

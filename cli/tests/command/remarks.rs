@@ -19,11 +19,50 @@ fn a_simulation_says_which_noise_it_is_without() {
     let truth = ["--fix", "rs=0.63", "--fix", "ls=4e-3", "--fix", "ke=0.95"];
     let remarks = |words: &[&str]| bench.ends(0, &[&["simulate"], words, &["record.csv"], &truth[..]].concat()).1;
     let all = remarks(&["noisy.toml"]);
-    let says = "simulated without `noise` of id, iq and `diffusion` of id of the model; --noise OUTPUT=STD adds white noise to an output";
+    let says = "simulated without `noise` of id, iq and `diffusion` of id of the model; --noisy simulates with it";
     assert!(all.lines().any(|line| line == says), "{all}");
     let some = remarks(&["noisy.toml", "--noise", "id=0.05", "--noise", "iq=0.01"]);
-    assert!(some.lines().any(|line| line == "simulated without `diffusion` of id of the model"), "{some}");
+    let says = "simulated without `diffusion` of id of the model; --noisy simulates with it";
+    assert!(some.lines().any(|line| line == says), "{some}");
     assert!(!remarks(&["pmsm.toml"]).contains("simulated without"));
+    assert!(!remarks(&["noisy.toml", "--noisy"]).contains("simulated without"));
+    let none = remarks(&["pmsm.toml", "--noisy"]);
+    assert!(
+        none.contains("--noisy: the model has no noise; it says `noise` of outputs and `diffusion` of states"),
+        "{none}"
+    );
+}
+
+/// Noise of the outputs is drawn as `--noise` draws it, process noise beside it.
+#[test]
+fn a_noisy_simulation_has_the_noise_of_the_model() {
+    let bench = noisy();
+    let truth = ["--fix", "rs=0.63", "--fix", "ls=4e-3", "--fix", "ke=0.95"];
+    let columns = |words: &[&str]| -> Vec<[f64; 2]> {
+        let (out, _) = bench.ends(0, &[&["simulate", "noisy.toml"], words, &["record.csv"], &truth[..]].concat());
+        let row = |line: &str| {
+            let cells: Vec<f64> = line.rsplit(',').take(2).map(|cell| cell.parse().unwrap()).collect();
+            [cells[1], cells[0]]
+        };
+        out.lines().skip(1).filter(|line| line.starts_with(|c: char| c.is_ascii_digit())).map(row).collect()
+    };
+    let none = columns(&[]);
+    let (given, noisy) = (columns(&["--noise", "id=0.05", "--noise", "iq=0.01"]), columns(&["--noisy"]));
+    let both = columns(&["--noisy", "--noise", "id=0", "--noise", "iq=0"]);
+    assert_eq!(noisy, columns(&["--noisy", "--seed", "1"]));
+    assert_ne!(noisy, columns(&["--noisy", "--seed", "2"]));
+    let mut moved = 0.0f64;
+    for k in 0..none.len() {
+        for j in 0..2 {
+            // Of numbers up to some 100, rounded when they are added.
+            let added = (noisy[k][j] - both[k][j]) - (given[k][j] - none[k][j]);
+            assert!(added.abs() < 1e-12, "{k} {j}: {added}");
+        }
+        moved = moved.max((both[k][0] - none[k][0]).abs());
+    }
+    assert_eq!(none.len(), 2000);
+    // 0.1 rs / sqrt(2 rs / ls) = 3.6 mA, seldom more than five of them.
+    assert!((0.006..0.02).contains(&moved), "{moved}");
 }
 
 #[test]
