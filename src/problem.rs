@@ -121,6 +121,7 @@ impl<'a> Problem<'a> {
             records.iter().try_for_each(check_steps)?;
         }
         settings.check(sweep.layout(), &records)?;
+        let parameters = &unknowns::with_scales(&*sweep, parameters);
         let unknowns = Arc::new(Unknowns::new(&*sweep, &records, parameters)?);
         let prepared = Problem::prepared(&*sweep, &records, parameters)?;
         unknowns.check_starts(&*sweep, &records)?;

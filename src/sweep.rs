@@ -221,6 +221,11 @@ pub trait Sweep: Send + Sync {
         &[]
     }
 
+    /// Those of the [`levels`](Self::levels) whose sign means nothing.
+    fn scales(&self) -> &[usize] {
+        &[]
+    }
+
     /// Prepares a record, once, with the parameters at their start values.
     ///
     /// # Errors

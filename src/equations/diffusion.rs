@@ -39,6 +39,24 @@ impl Equations {
         (0..of_noise.len()).filter(|&i| of_noise[i] && !of_others[i]).collect()
     }
 
+    /// Those of its [`levels`](Self::levels) whose sign means nothing: each noise that depends on one is the same or its opposite for the opposite value.
+    pub(crate) fn scales(&self) -> Vec<usize> {
+        let Roots { diffusion, noise, initial_noise, .. } = &self.roots;
+        let (x, u) = (vec![PLACE; self.layout.states.len()], vec![PLACE; self.layout.inputs.len()]);
+        let sizes = |p: &[f64]| -> Vec<f64> {
+            let roots = [&**diffusion, noise, initial_noise].concat();
+            evaluate(&self.graph, &roots, Some((PLACE, &x, &u)), p).into_iter().map(f64::abs).collect()
+        };
+        let p = vec![PLACE; self.layout.parameters.len()];
+        let is_scale = |level: &usize| {
+            let mut opposite = p.clone();
+            opposite[*level] = -PLACE;
+            // What is not said is no number.
+            sizes(&p).iter().zip(sizes(&opposite)).all(|(a, b)| *a == b || a.is_nan() && b.is_nan())
+        };
+        self.levels().into_iter().filter(is_scale).collect()
+    }
+
     /// Its process noise, with parameters of these values, some of which are free.
     pub(crate) fn process_noise(&self, p: &[f64], free: &[bool]) -> Diffusion {
         let number = |i: usize| self.roots.diffusion.get(i).map(|root| self.graph.known(*root));
@@ -107,6 +125,8 @@ mod tests {
         assert_eq!(product.process_noise(&p, &free), Diffusion { states: vec![0], levels: vec![1], remaining: vec![] });
         let without = product.undisturbed();
         assert_eq!(without.process_noise(&p, &free), Diffusion { states: vec![], levels: vec![], remaining: vec![] });
+        // The opposite of `s` is another noise of `y`.
+        assert_eq!((equations.levels(), equations.scales()), (vec![1, 2, 3, 4], vec![1, 3, 4]));
         assert!(without.roots().noise.len() == 1 && without.graph().len() < product.graph().len());
     }
 }

@@ -386,6 +386,24 @@ pub(crate) fn names(layout: &[Quantity]) -> Vec<String> {
     layout.iter().map(|quantity| quantity.name.clone()).collect()
 }
 
+/// The declarations, with the logarithms of those levels of noise that were declared positive and whose sign means nothing: towards a level of zero the slopes
+/// vanish, and a search for it as it is would not end, nor would its interval have an end.
+pub(crate) fn with_scales(sweep: &dyn Sweep, parameters: &[Parameter]) -> Vec<Parameter> {
+    let mut parameters = parameters.to_vec();
+    let scales = if sweep.predicts_variance() { sweep.scales() } else { &[] };
+    for i in scales {
+        let parameter = &mut parameters[*i];
+        if parameter.free
+            && parameter.positive
+            && parameter.start > 0.0
+            && [0.0, f64::NEG_INFINITY].contains(&parameter.lower)
+        {
+            parameter.transform = Transform::Log;
+        }
+    }
+    parameters
+}
+
 /// Whether as many parameters were declared as the layout has.
 pub(crate) fn check_count(layout: &Layout, parameters: &[Parameter]) -> Result<(), Error> {
     if parameters.len() == layout.parameters.len() {

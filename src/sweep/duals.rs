@@ -26,6 +26,8 @@ pub(crate) struct Uncompiled {
     pub choices: Option<Choices>,
     /// The parameters that stand in their noise alone.
     pub levels: Vec<usize>,
+    /// Those of them whose sign means nothing.
+    pub scales: Vec<usize>,
 }
 
 impl Uncompiled {
@@ -35,7 +37,8 @@ impl Uncompiled {
     }
 
     pub fn of(equations: &Equations, reason: String) -> Self {
-        Uncompiled { reason, choices: Some(choices(equations.graph())), levels: equations.levels() }
+        let (choices, levels, scales) = (choices(equations.graph()), equations.levels(), equations.scales());
+        Uncompiled { reason, choices: Some(choices), levels, scales }
     }
 }
 
@@ -97,6 +100,10 @@ impl Sweep for DualSweep<'_> {
 
     fn levels(&self) -> &[usize] {
         &self.uncompiled.levels
+    }
+
+    fn scales(&self) -> &[usize] {
+        &self.uncompiled.scales
     }
 
     fn linearizes_choices(&self) -> bool {

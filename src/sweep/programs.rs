@@ -231,6 +231,10 @@ impl Sweep for ProgramSweep<'_> {
         self.plain.levels()
     }
 
+    fn scales(&self) -> &[usize] {
+        self.plain.scales()
+    }
+
     fn linearizes_choices(&self) -> bool {
         self.plain.linearizes_choices()
     }

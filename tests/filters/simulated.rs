@@ -120,3 +120,35 @@ fn equations_draw_what_a_model_draws() {
     equations_draw_the_same::<false>();
     equations_draw_the_same::<true>();
 }
+
+/// A level of noise that is declared positive is searched by its logarithm: where the plant is not disturbed, it is held at zero with care, and what
+/// is declared without stays as it is. A search for it as it is ends at the precision of the cost, of a right model.
+#[test]
+fn a_level_of_zero_is_held() {
+    let model = Heated::<false>;
+    let time = Time::Uniform { start: 0.0, step: 0.3 };
+    let inputs: Vec<Heat> = (0..600).map(|k| Heat { u: [1.0, -0.5, 2.0][k / 20 % 3] }).collect();
+    let start = |level: Parameter| Building {
+        tau: free(1.0),
+        lose: free(2.0),
+        gain: free(1.2),
+        q: level,
+        r: free(0.1).positive(),
+        p0: fixed(0.0),
+    };
+    let mut held = 0;
+    for seed in 1..=8 {
+        let run = Simulator::new(&model).integrator(Rk45::default());
+        let run = run.run(&TRUTH, &Walls { a: 0.5, b: -0.3 }, time.clone(), &inputs).unwrap();
+        let record = run.with_noise(Probes { y: 0.15, z: 0.3 }, seed).experiment(&model).unwrap();
+        let fit = |level| Fit::new(&model, &record).parameters(start(level)).predictor(Kalman).run().unwrap();
+        let positive = fit(free(0.2).positive());
+        let [q, r] = [3, 4].map(|i| &positive.unknowns[i]);
+        assert_eq!((q.transform, r.transform), (Transform::Log, Transform::Log));
+        assert!(positive.severity() <= Severity::UsableWithCare, "{seed}: {positive}");
+        held += usize::from(matches!(q.knowledge, Knowledge::Held { bound: 0.0, .. }));
+        assert_eq!(fit(free(0.2)).unknowns[3].transform, Transform::Identity);
+    }
+    // Of an unknown at a bound half of the estimates are there.
+    assert!((2..=7).contains(&held), "{held}");
+}
