@@ -116,11 +116,11 @@ impl Fit<'_, Equations> {
             plant
                 .flow(&mut x)
                 .map_err(|Stuck| failure("the progress of the integrator, state", &layout.states[0], x[0]))?;
-            let mut levels = vec![0.0; n];
-            plant.diffusion(0.0, &begin, &mut levels);
-            if levels.iter().all(|level| *level == 0.0) {
+            if self.model.roots().diffusion.is_empty() {
                 continue;
             }
+            let mut levels = vec![0.0; n];
+            plant.diffusion(0.0, &begin, &mut levels);
             let slopes = (layout.kind == Kind::Continuous).then(|| {
                 let mut slopes = vec![0.0; n * n];
                 plant.state_slopes(0.0, &begin, &mut slopes);
