@@ -23,12 +23,13 @@ impl Fit<'_, Equations> {
     /// ```
     /// # use greybox::{Fit, Time, fixed, record::{Channel, Record}, text::Model};
     /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
-    /// let tank = Model::parse("greybox = 1\n[parameters]\na = 0.5\nq = 0.2\n[inputs]\nu = \"1\"\n\
+    /// let tank = Model::named("tank", "greybox = 1\n[parameters]\na = { start = 0.5 }\nq = { start = 0.2 }\n[inputs]\nu = \"1\"\n\
     ///     [states]\nx = { derivative = \"u - a*x\", diffusion = \"q\" }\n[outputs]\nx = { value = \"x\", noise = 0.1 }\n")?;
     /// let time = Time::Uniform { start: 0.0, step: 1.0 };
-    /// let inputs = Record::new(vec![], time, vec![Channel::new("u", "1", vec![0.0; 2000])], vec![])?;
+    /// let states = tank.equations().layout().states.clone();
+    /// let inputs = Record::new(states, time, vec![Channel::new("u", "1", vec![0.0; 2000])], vec![])?;
     /// let none: [Record; 0] = [];
-    /// let fit = Fit::new(tank.equations(), &none).parameters(vec![fixed(0.5), fixed(0.2)]);
+    /// let fit = Fit::new(&**tank.equations(), &none).parameters(vec![fixed(0.5), fixed(0.2)]);
     /// let run = fit.simulate_noisy(&[0.0], &inputs, &[None], 7)?;
     /// let variance = run.outputs()[0].values.iter().map(|x| x * x).sum::<f64>() / 2000.0;
     /// assert!((variance / 0.05 - 1.0).abs() < 0.2); // q^2 / 2a, and 0.1^2
