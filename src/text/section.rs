@@ -48,7 +48,9 @@ impl From<&Model> for Section {
                 rows.push((format!("{what} of {}", quantity.name), model.written(expression)));
             }
         }
-        let number = |(name, value, unit): (&str, f64, &str)| (name.to_owned(), format!("{value} {unit}"));
+        // A number without dimension has the unit "1", which beside it reads as another digit.
+        let unit = |unit: &str| if unit == "1" { String::new() } else { format!(" {unit}") };
+        let number = |(name, value, of): (&str, f64, &str)| (name.to_owned(), format!("{value}{}", unit(of)));
         rows.extend(model.constants().into_iter().map(number));
         let row = |(left, right): (String, String)| [Cell::from(left.as_str()), Cell::from(right.trim_end())];
         let table = Table::new("", ["quantity", "equation"]).rows(rows.into_iter().map(row));

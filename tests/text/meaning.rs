@@ -60,7 +60,7 @@ fn a_section_has_dead_times_and_noise() {
         text.replacen("initial = \"first\" }", "initial = \"first\", diffusion = 0.25, initial_noise = 0.5 }", 1);
     let table = greybox::report::Section::from(&model(&text)).tables[0].to_string();
     let rows: Vec<Vec<&str>> = table.lines().map(|line| line.split_whitespace().collect()).collect();
-    for row in ["delay of ud 2*late", "diffusion of id 0.25", "noise of iq 0.05", "initial noise of id 0.5"] {
+    for row in ["delay of ud 2*late", "diffusion of id 0.25", "noise of iq 0.05", "initial noise of id 0.5", "np 4"] {
         assert!(rows.iter().any(|cells| cells.join(" ") == row), "{row} in\n{table}");
     }
     assert!(!table.lines().any(|line| line.starts_with("noise of id")), "{table}");
