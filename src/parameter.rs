@@ -96,8 +96,8 @@ impl Parameter {
 
     /// Declares that only a positive value has a meaning (a resistance, a mass, a friction), from physics. The search is not
     /// bounded: data that lead it to zero or below contradict the model, and the estimate is then not usable. Of minima of the same cost, such as
-    /// mirror images, one is taken where it is positive. A level of noise, whose sign means nothing, is estimated by its
-    /// [logarithm](Self::log), unless it has a lower bound above zero: a plant that is not disturbed is no contradiction.
+    /// mirror images, one is taken where it is positive. A level of noise of a filter, on whose sign no
+    /// variance depends, is estimated by its [logarithm](Self::log), unless it has a lower bound other than zero: where zero is best, it is held there.
     pub fn positive(self) -> Self {
         Parameter { positive: true, ..self }
     }

@@ -221,7 +221,7 @@ pub trait Sweep: Send + Sync {
         &[]
     }
 
-    /// Those of the [`levels`](Self::levels) whose sign means nothing.
+    /// Those of the [`levels`](Self::levels) on whose sign no variance depends.
     fn scales(&self) -> &[usize] {
         &[]
     }

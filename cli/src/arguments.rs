@@ -259,7 +259,7 @@ pub struct Simulate {
     /// The integrator: automatic, `rk4:4` (steps per sample), `rk45:1e-8`, `esdirk:1e-8`, discrete.
     #[arg(long)]
     pub integrator: Option<String>,
-    /// Simulate with the noise that the model has: process noise (`diffusion`), and noise of outputs where `--noise` says no other.
+    /// Simulate with the noise of the model: process noise (`diffusion`), and `noise` of the outputs that `--noise` does not name.
     #[arg(long)]
     pub noisy: bool,
     /// Add white noise to an output.

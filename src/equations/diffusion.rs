@@ -39,7 +39,7 @@ impl Equations {
         (0..of_noise.len()).filter(|&i| of_noise[i] && !of_others[i]).collect()
     }
 
-    /// Those of its [`levels`](Self::levels) whose sign means nothing: each noise that depends on one is the same or its opposite for the opposite value.
+    /// Those of its [`levels`](Self::levels) on whose sign no variance depends: with the opposite value each standard deviation is the same or the opposite number.
     pub(crate) fn scales(&self) -> Vec<usize> {
         let Roots { diffusion, noise, initial_noise, .. } = &self.roots;
         let (x, u) = (vec![PLACE; self.layout.states.len()], vec![PLACE; self.layout.inputs.len()]);

@@ -2,7 +2,7 @@
 
 use super::Fit;
 use super::fittable::{AnyStepping, Made};
-use super::simulate::with_outputs;
+use super::simulate::{given, with_outputs};
 use crate::equations::Equations;
 use crate::error::{Error, Failure};
 use crate::functions::delays;
@@ -18,7 +18,8 @@ impl Fit<'_, Equations> {
     /// [`simulate`](Self::simulate) with the noise that the equations have: process noise disturbs the state
     /// ([`Model::diffusion`](crate::Model::diffusion)), as by [`Simulator::disturbed`](crate::Simulator::disturbed), and white Gaussian noise is added to the outputs
     /// ([`Model::noise`](crate::Model::noise)), of the state and the inputs at each sample. `noise` has an entry per output: a standard deviation in place of the
-    /// equations'. An output of which neither says one is without. The same seed draws the same.
+    /// equations'. An output of which neither says one is without. The same seed draws the same. Where no integrator was chosen, steps become finer until the
+    /// disturbed outputs settle, as in [`simulate`](Self::simulate).
     ///
     /// ```
     /// # use greybox::{Fit, Time, fixed, record::{Channel, Record}, text::Model};
@@ -38,7 +39,7 @@ impl Fit<'_, Equations> {
     /// ```
     ///
     /// # Errors
-    /// As [`simulate`](Self::simulate), which runs before; a standard deviation that is negative or not finite; a state or an output that is not finite.
+    /// As [`simulate`](Self::simulate); a standard deviation that is negative or not finite; a state or an output that is not finite.
     pub fn simulate_noisy(
         &self,
         initial: &[f64],
@@ -59,12 +60,28 @@ impl Fit<'_, Equations> {
                 )));
             }
         }
-        // By the steps that are fine enough without noise.
-        let (without, stepping) = self.simulated(initial, inputs)?;
-        let record = with_outputs(layout, inputs, without)?;
+        // The random numbers are the same for each integrator, so that the outputs converge as steps become finer.
+        let outputs = self.settled(|stepping| self.disturbed(initial, inputs, noise, seed, stepping))?;
+        with_outputs(layout, inputs, outputs)
+    }
+
+    /// The outputs with noise, by one integrator.
+    fn disturbed(
+        &self,
+        initial: &[f64],
+        inputs: &Record,
+        noise: &[Option<f64>],
+        seed: u64,
+        stepping: Option<&AnyStepping>,
+    ) -> Result<Vec<Vec<f64>>, Error> {
+        let layout = self.model.layout();
+        let zeros = vec![vec![0.0; inputs.len()]; noise.len()];
+        // Checks the initial state, the parameters and the integrator.
+        let problem = self.of_inputs(inputs, zeros, given(initial), stepping)?;
+        let record = &problem.records[0];
         let p: Vec<f64> = self.parameters.iter().map(|parameter| parameter.start).collect();
         let code = Evaluated::new(self.model.lent().shared());
-        let (method, intervals) = (AnyStepping::method(stepping.as_ref()), Intervals::default());
+        let (method, intervals) = (AnyStepping::method(stepping), Intervals::default());
         let delays = delays(code.values(), &code.late(&p), &p);
         let mut disturbance = Disturbance::new(layout.states.len(), seed);
         let mut of_outputs: Vec<Random> = (0..noise.len() as u64).map(|j| Random::stream(seed, j)).collect();
@@ -76,23 +93,23 @@ impl Fit<'_, Equations> {
                 functions: code.values(),
                 duals: code.duals(),
                 method: &*method,
-                between: Between::new(&record, k, &delays),
+                between: Between::new(record, k, &delays),
                 p: &p,
                 intervals: &intervals,
             };
-            let failure = |what: &str, of: &Quantity, value: f64| {
+            let failure = |signal: String, value: f64| {
                 Error::Simulation(Failure {
                     experiment: record.name().to_owned(),
                     sample: k,
                     time: record.moment(k),
-                    signal: format!("{what} `{}`", of.name),
+                    signal,
                     value,
                     hint: "; check the parameters, the levels of noise and the initial state",
                 })
             };
             let check = |what: &str, of: &[Quantity], values: &[f64]| {
                 let wrong = of.iter().zip(values).find(|(_, value)| !value.is_finite());
-                wrong.map_or(Ok(()), |(of, value)| Err(failure(what, of, *value)))
+                wrong.map_or(Ok(()), |(of, value)| Err(failure(format!("{what} `{}`", of.name), *value)))
             };
             check("state", &layout.states, &x)?;
             let mut y = vec![0.0; noise.len()];
@@ -100,10 +117,8 @@ impl Fit<'_, Equations> {
             let mut levels = vec![f64::NAN; noise.len()];
             plant.noise(&x, &mut levels);
             for (j, level) in levels.iter().enumerate() {
-                // An output without noise draws, so that the others draw the same with and without it.
-                let normal = of_outputs[j].normal();
                 if let Some(level) = noise[j].or_else(|| self.model.says_noise(j).then_some(*level)) {
-                    y[j] += level * normal;
+                    y[j] += level * of_outputs[j].normal();
                 }
             }
             check("output", &layout.outputs, &y)?;
@@ -114,9 +129,7 @@ impl Fit<'_, Equations> {
             plant.jump(&mut x);
             let begin = x.clone();
             let n = x.len();
-            plant
-                .flow(&mut x)
-                .map_err(|Stuck| failure("the progress of the integrator, state", &layout.states[0], x[0]))?;
+            plant.flow(&mut x).map_err(|Stuck| failure("the progress of the integrator".to_owned(), 0.0))?;
             if self.model.roots().diffusion.is_empty() {
                 continue;
             }
@@ -130,6 +143,6 @@ impl Fit<'_, Equations> {
             let added = disturbance.draw(slopes.as_deref(), &levels, plant.length());
             x.iter_mut().zip(added).for_each(|(x, added)| *x += added);
         }
-        with_outputs(layout, inputs, outputs)
+        Ok(outputs)
     }
 }

@@ -25,24 +25,20 @@ impl Fit<'_, Equations> {
     /// # Errors
     /// Other inputs or states than the equations have, an initial state that is not finite; a simulation that fails.
     pub fn simulate(&self, initial: &[f64], inputs: &Record) -> Result<Record, Error> {
-        let (outputs, _) = self.simulated(initial, inputs)?;
+        let zeros = vec![vec![0.0; inputs.len()]; self.model.layout().outputs.len()];
+        let outputs = self.settled(|stepping| {
+            let problem = self.of_inputs(inputs, zeros.clone(), given(initial), stepping)?;
+            Ok(problem.in_units(&Control::NEVER).predict(0, &[])?.outputs)
+        })?;
         with_outputs(self.model.layout(), inputs, outputs)
     }
 
-    /// The simulated outputs, and the integrator; `None`: the default one.
-    pub(super) fn simulated(
+    /// The outputs of a simulation by the integrator that was chosen; without one, by steps that become finer until the outputs settle.
+    pub(super) fn settled(
         &self,
-        initial: &[f64],
-        inputs: &Record,
-    ) -> Result<(Vec<Vec<f64>>, Option<AnyStepping>), Error> {
-        let given = Initial::Given(initial.iter().copied().map(fixed).collect());
-        let zeros = vec![vec![0.0; inputs.len()]; self.model.layout().outputs.len()];
-        let by = |stepping: Option<&AnyStepping>| {
-            let problem = self.of_inputs(inputs, zeros.clone(), given.clone(), stepping)?;
-            Ok::<_, Error>(problem.in_units(&Control::NEVER).predict(0, &[])?.outputs)
-        };
+        by: impl Fn(Option<&AnyStepping>) -> Result<Vec<Vec<f64>>, Error>,
+    ) -> Result<Vec<Vec<f64>>, Error> {
         let (mut outputs, mut before) = (by(self.stepping.as_ref()), f64::INFINITY);
-        let mut taken = self.stepping.clone();
         let chosen = self.stepping.is_some() || self.model.layout().kind != Kind::Continuous;
         let finer = if chosen { vec![] } else { self.model.finer(true) };
         for (_, stepping) in &finer {
@@ -50,7 +46,7 @@ impl Fit<'_, Equations> {
             let change = outputs.as_ref().ok().zip(again.as_ref().ok()).map_or(f64::INFINITY, |(a, b)| change(a, b));
             let is_exact = stepping.is_exact() && again.is_ok();
             if again.is_ok() || outputs.is_err() {
-                (outputs, taken) = (again, Some(stepping.clone()));
+                outputs = again;
             }
             // Of a model with jumps of its derivatives, and of outputs that are rounding, finer steps are no nearer.
             if is_exact || change <= NEAR || change <= ROUGH && change > 0.5 * before {
@@ -58,7 +54,7 @@ impl Fit<'_, Equations> {
             }
             before = change;
         }
-        Ok((outputs?, taken))
+        outputs
     }
 
     /// The state at the first sample of a record of inputs, as that declares it ([`Initial`]) or the model says it, with the starts of the parameters;
@@ -96,7 +92,7 @@ impl Fit<'_, Equations> {
     }
 
     /// The problem of a record of inputs with these outputs, by an integrator.
-    fn of_inputs(
+    pub(super) fn of_inputs(
         &self,
         inputs: &Record,
         outputs: Vec<Vec<f64>>,
@@ -108,6 +104,11 @@ impl Fit<'_, Equations> {
         let sweep = Equations::sweep(self.model.lent(), stepping, None)?;
         Problem::unchecked(sweep, vec![record], &parameters, Settings::default())
     }
+}
+
+/// An initial state as a record has it.
+pub(super) fn given(initial: &[f64]) -> Initial {
+    Initial::Given(initial.iter().copied().map(fixed).collect())
 }
 
 /// By which part of its largest value an output of two simulations differs most.

@@ -386,8 +386,8 @@ pub(crate) fn names(layout: &[Quantity]) -> Vec<String> {
     layout.iter().map(|quantity| quantity.name.clone()).collect()
 }
 
-/// The declarations, with the logarithms of those levels of noise that were declared positive and whose sign means nothing: towards a level of zero the slopes
-/// vanish, and a search for it as it is would not end, nor would its interval have an end.
+/// The declarations, where levels of noise that were declared positive, and on whose sign nothing depends, are estimated by their logarithms. The likelihood
+/// depends on the square of a level, whose slope vanishes at zero: where zero is best, a search for the level itself converges slowly, and its standard error has no limit.
 pub(crate) fn with_scales(sweep: &dyn Sweep, parameters: &[Parameter]) -> Vec<Parameter> {
     let mut parameters = parameters.to_vec();
     let scales = if sweep.predicts_variance() { sweep.scales() } else { &[] };

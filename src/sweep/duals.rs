@@ -26,7 +26,7 @@ pub(crate) struct Uncompiled {
     pub choices: Option<Choices>,
     /// The parameters that stand in their noise alone.
     pub levels: Vec<usize>,
-    /// Those of them whose sign means nothing.
+    /// Those of them on whose sign no variance depends.
     pub scales: Vec<usize>,
 }
 

@@ -48,7 +48,7 @@ impl From<&Model> for Section {
                 rows.push((format!("{what} of {}", quantity.name), model.written(expression)));
             }
         }
-        // A number without dimension has the unit "1", which beside it reads as another digit.
+        // The unit "1" of a number without dimension is left out: `4 1` reads as two numbers.
         let unit = |unit: &str| if unit == "1" { String::new() } else { format!(" {unit}") };
         let number = |(name, value, of): (&str, f64, &str)| (name.to_owned(), format!("{value}{}", unit(of)));
         rows.extend(model.constants().into_iter().map(number));

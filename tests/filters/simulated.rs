@@ -152,3 +152,25 @@ fn a_level_of_zero_is_held() {
     // Of an unknown at a bound half of the estimates are there.
     assert!((2..=7).contains(&held), "{held}");
 }
+
+/// Steps are as fine as the disturbed plant asks for, also where it would rest without noise: a cubic decay with ten and twenty time constants between two
+/// samples forgets its state from one to the next. Its variance is, to the first order in the cubic part, that of the linear plant.
+#[test]
+fn steps_follow_the_disturbed_plant() {
+    let text = "greybox = 1\n[inputs]\nu = \"V\"\n[parameters]\na = { start = 1.0 }\nq = { start = 1.0 }\n[states]\n\
+        x = { unit = \"V\", derivative = \"u - a*(x + 0.1*x^3)\", diffusion = \"q\" }\n[outputs]\nx = \"x\"\n";
+    let model = text::Model::named("decay", text).unwrap();
+    let (time, states) = (Time::Uniform { start: 0.0, step: 0.05 }, model.equations().layout().states.clone());
+    let channel = record::Channel::new("u", "V", vec![0.0; 5000]);
+    let inputs = record::Record::new(states, time, vec![channel], vec![]).unwrap();
+    let none: [record::Record; 0] = [];
+    for a in [200.0, 400.0] {
+        let fit = Fit::new(&**model.equations(), &none).parameters(vec![fixed(a), fixed(1.0)]);
+        let run = fit.simulate_noisy(&[0.0], &inputs, &[None], 1).unwrap();
+        let x = &run.outputs()[0].values;
+        let variance = x.iter().map(|x| x * x).sum::<f64>() / 5000.0;
+        let neighbors = x.windows(2).map(|pair| pair[0] * pair[1]).sum::<f64>() / 5000.0 / variance;
+        // Four deviations of 5,000 independent numbers.
+        assert!((2.0 * a * variance - 1.0).abs() < 0.08 && neighbors.abs() < 0.057, "{a}: {variance} {neighbors}");
+    }
+}

@@ -171,7 +171,7 @@ fn a_killed_fleet_goes_on_with_nothing_twice() {
         assert!(kills < 100);
     }
     assert_eq!(std::fs::read_to_string(bench.path("t.csv")).unwrap(), whole);
-    // Rows of a journal that was not removed are in both; the last one counts, so that the order may be another.
+    // A journal that was not removed: each of its rows is in the table, too, and is taken once; rows may change their order.
     std::fs::write(&journal, killed).unwrap();
     bench.run(&words("t.csv"));
     let sorted = |text: &str| text.lines().map(str::to_owned).collect::<BTreeSet<_>>();
